@@ -2,7 +2,7 @@
 //! bisection, take its time and its work.
 
 use super::motion::bisect;
-use super::verdict::{Verdict, number, word};
+use super::verdict::{Checked, Verdict, number, word};
 use crate::dataset::Row;
 use crate::model::{Law, Transition};
 use crate::numerics::radau::radau;
@@ -120,16 +120,16 @@ pub fn certify(
 }
 
 /// Checks a row of `optimal`.
-pub fn check(row: &Row, problem: &Transition, t_f: f64) -> Verdict {
+pub fn check(row: &Row, problem: &Transition, t_f: f64) -> Checked {
     let mut verdict = Verdict::default();
     let infeasible = t_f <= (problem.v_i - problem.v_f) / problem.v_i / problem.v_f;
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
-        return verdict;
+        return Ok(verdict);
     }
     let numbers = ["hamiltonian", "theta_max", "v_start", "v_end"].map(|column| number(row, column));
     let [Some(h), Some(theta_max), Some(v_start), Some(v_end)] = numbers else {
-        return Verdict::unchecked("a column is not written: hamiltonian, theta_max, v_start or v_end");
+        return Err("a column is not written: hamiltonian, theta_max, v_start or v_end");
     };
     let work = certify(&mut verdict, problem, t_f, [h, theta_max, v_start, v_end]);
     verdict.compare(row, "work", work, None);
@@ -137,7 +137,7 @@ pub fn check(row: &Row, problem: &Transition, t_f: f64) -> Verdict {
         if v_start < problem.v_i && v_end > problem.v_f { theta_max } else { 1.0 / problem.v_i.min(problem.v_f) };
     verdict.compare(row, "theta_max", Some(greatest), None);
     verdict.compare_word(row, "strategy", if v_start > problem.v_i { "speed_up" } else { "slow_down" });
-    verdict
+    Ok(verdict)
 }
 
 /// Compares the gap of a protocol of work `work` to the optimum.

@@ -1,10 +1,10 @@
 //! `best_cubic`: the work at the row's coefficients, integrated over time, and a search for less work around them.
 
 use super::gap::Cubic;
-use super::optimal::{certify, compare_gap};
-use super::relaxed;
-use super::verdict::{NEGATIVE, state_law};
-use super::{Context, Verdict, number, transition, word};
+use super::optimal::compare_gap;
+use super::task::Task;
+use super::verdict::{Checked, NEGATIVE, axis, state_law};
+use super::{Context, Verdict, number, relaxed, transition, word};
 use crate::dataset::Row;
 use crate::model::StateLaw;
 use crate::table::STATUS;
@@ -19,21 +19,18 @@ const FAR_FRACTIONS: [f64; 5] = [0.2, 0.4, 0.8, 1.6, 3.2];
 /// Relative rounding error of a square root of a number that rounding alone keeps from 0. Derived: the root of 1e-15, with room.
 const HALF_OF_THE_DIGITS: f64 = 1e-7;
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
-    let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
-        return Verdict::unchecked("an axis is missing");
-    };
-    let Some(state) = state_law(row) else { return Verdict::unchecked("the law is unknown") };
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
+    let (problem, t_f, state) = (transition(row)?, axis(row, "t_f")?, state_law(row)?);
     if !matches!(word(row, STATUS), Some("ok" | NEGATIVE)) {
-        return Verdict::unchecked("status is neither ok nor negative_friction");
+        return Err("status is neither ok nor negative_friction");
     }
     let (Some(alpha_2), Some(alpha_3)) = (number(row, "alpha_2"), number(row, "alpha_3")) else {
-        return Verdict::unchecked("a coefficient was not written");
+        return Err("a coefficient was not written");
     };
     let a_2 = if context.relative[0] { alpha_2 } else { alpha_2 * t_f };
     let a_3 = if context.relative[1] { alpha_3 } else { alpha_3 * t_f * t_f };
     let cubic = Cubic::new(&problem, t_f, a_2, a_3).under(state);
-    let Some(work) = cubic.work() else { return Verdict::unchecked("the integrator did not get there") };
+    let work = cubic.work().ok_or("the integrator did not get there")?;
     let mut verdict = Verdict::default();
     verdict.compare(row, "work", Some(work), None);
     // The coefficients are stored in double precision, so v_min reaches the bound only within their rounding.
@@ -48,7 +45,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         compare_gap(&mut verdict, row, optimum.value, Some(work));
     } else if v_ceiling.is_finite() {
         verdict.miss("the optimum of ageing under a velocity ceiling: the table optimal has its check");
-    } else if let Some(optimum) = certify(&mut verdict, &problem, t_f, context.bounded) {
+    } else if let Some(optimum) = Task::new(&problem, t_f, context.bounded).certify(&mut verdict) {
         verdict.compare(row, "work_optimal", Some(optimum.work), None);
         // The relative error is up to 1e-7 for any rtol. The difference of two integrations determines the gap to 1e-12, or to the error of the
         // works.
@@ -75,5 +72,5 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     }
     // Differences below the rounding error of an integration are ignored.
     verdict.push("beaten", if saved > rtol { saved } else { 0.0 });
-    verdict
+    Ok(verdict)
 }

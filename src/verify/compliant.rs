@@ -2,8 +2,8 @@
 
 use super::motion::Followed;
 use super::open_loop::ControlledProtocol;
-use super::optimal::{compare, min_duration};
-use super::verdict::{Context, Verdict, number, transition, word};
+use super::task::{Task, min_duration};
+use super::verdict::{Checked, Context, Verdict, axis, number, transition, word};
 use crate::dataset::{Cell, Row};
 use crate::model::Transition;
 use crate::protocol::{Moment, SpringBlock, compliant};
@@ -28,22 +28,19 @@ impl Exponent {
     }
 }
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
-    let numbers = ["t_f", "k", "m"].map(|name| number(row, name));
-    let (Some(problem), [Some(t_f), Some(k), Some(m)]) = (transition(row), numbers) else {
-        return Verdict::unchecked("an axis is missing");
-    };
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
+    let (problem, t_f, k, m) = (transition(row)?, axis(row, "t_f")?, axis(row, "k")?, axis(row, "m")?);
     let mut verdict = Verdict::default();
-    let infeasible = t_f <= min_duration(&problem);
+    let infeasible = t_f <= min_duration(&problem, true);
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
-        return verdict;
+        return Ok(verdict);
     }
     let Transition { law, v_i, v_f } = problem;
     let slider = SpringBlock { law, k, m };
     let Ok(path) = compliant::path(&slider, (v_i, v_f), t_f, rtol) else {
         verdict.push("motion", f64::INFINITY);
-        return verdict;
+        return Ok(verdict);
     };
     let followed = Followed::new(Box::new(path), &slider);
     let plain = Exponent::new(&problem, 0.0);
@@ -56,8 +53,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     };
     let all = followed.samples.iter().map(|(_, at)| coefficient((at.t, at.v)));
     let determined = all.filter(|(alpha, noise)| alpha.is_finite() && noise.is_finite());
-    let Some((alpha, noise)) = determined.min_by(|x, y| x.1.total_cmp(&y.1)) else { return verdict };
-    verdict.demand(row, "alpha");
+    let Some((alpha, noise)) = determined.min_by(|x, y| x.1.total_cmp(&y.1)) else { return Ok(verdict) };
+    verdict.demand(row, "alpha", true);
     verdict.compare(row, "alpha", Some(alpha), Some(alpha.abs() + noise / rtol));
     let alpha = number(row, "alpha").unwrap_or(alpha);
     let exponent = Exponent::new(&problem, alpha);
@@ -81,8 +78,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     // proportion to the greatest force of the motion.
     let reach = if k.is_finite() { k / law.a * t_f * size } else { 0.0 };
     open_loop(&mut verdict, row, &protocol, (v[0], 1.0 + reach + 1e-14 / rtol * followed.force), rtol);
-    compare(&mut verdict, row, (&problem, t_f), Some(followed.work), context.bounded);
-    verdict
+    Task::new(&problem, t_f, context.bounded).compare_gap(&mut verdict, row, Some(followed.work));
+    Ok(verdict)
 }
 
 /// Number of samples from which `sampling_error` is not checked. Chosen: limits the time of a check.

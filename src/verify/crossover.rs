@@ -1,8 +1,9 @@
 //! `crossover`: the optimum of each of the row's times meets the condition that defines the time.
 
-use super::optimal::{Optimum, certify, min_duration};
+use super::optimal::Optimum;
 use super::route::integrate;
-use super::verdict::NEGATIVE;
+use super::task::{Task, min_duration};
+use super::verdict::{Checked, NEGATIVE};
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::model::Transition;
@@ -26,11 +27,11 @@ fn compare(
     if !exists {
         return columns.iter().for_each(|column| verdict.compare(row, column, None, None));
     }
-    columns.iter().for_each(|column| verdict.demand(row, column));
+    columns.iter().for_each(|column| verdict.demand(row, column, true));
     let Some(t) = number(row, time).filter(|t| *t > 0.0) else {
         return verdict.miss("a work at a time that was not written");
     };
-    let mut at = |t: f64| certify(verdict, problem, t, bounded);
+    let mut at = |t: f64| Task::new(problem, t, bounded).certify(verdict);
     let (Some(before), Some(here), Some(after)) =
         (at(t * (1.0 - TIME_STEP_RTOL)), at(t), at(t * (1.0 + TIME_STEP_RTOL)))
     else {
@@ -41,10 +42,10 @@ fn compare(
     verdict.compare(row, work, Some(here.work), None);
 }
 
-pub fn check(row: &Row, context: &Context) -> Verdict {
-    let Some(problem) = transition(row) else { return Verdict::unchecked("an axis is missing") };
+pub fn check(row: &Row, context: &Context) -> Checked {
+    let problem = transition(row)?;
     if !matches!(word(row, STATUS), Some("ok" | NEGATIVE)) {
-        return Verdict::unchecked("status is neither ok nor negative_friction");
+        return Err("status is neither ok nor negative_friction");
     }
     let mut verdict = Verdict::default();
     let Transition { law, v_i, v_f } = problem;
@@ -76,11 +77,11 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     }
     compare(&mut verdict, row, ["t_free_out", ""], (window, false, &problem), &|at| at.start.v.ln());
     if !accelerates {
-        let t_min = min_duration(&problem);
+        let t_min = min_duration(&problem, true);
         verdict.compare(row, "t_min", bounded.then_some(t_min), (t_min == 0.0).then_some(1.0));
         let slope = |y: &[f64; 2]| [1.0 - y[0], 1.0 + b * y[0].ln()];
         let work = integrate(slope, [1.0 / v_i, 0.0], (0.0, t_min)).map(|y| y[1]);
         verdict.compare(row, "work_at_t_min", work.filter(|_| bounded), (t_min == 0.0).then_some(1.0));
     }
-    verdict
+    Ok(verdict)
 }

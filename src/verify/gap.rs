@@ -1,27 +1,22 @@
 //! `gap`: the work of the row's cubic, integrated over time; `W*` by integration of the extremal.
 
-use super::arcsinh;
 use super::motion::{self, bisect};
-use super::optimal::{compare, compare_gap, min_duration};
-use super::relaxed;
+use super::optimal::compare_gap;
 use super::route::integrate;
-use super::verdict::state_law;
-use super::{Context, Verdict, number, transition, word};
+use super::task::Task;
+use super::verdict::{Checked, axis, state_law};
+use super::{Context, Verdict, arcsinh, number, relaxed, transition, word};
 use crate::dataset::Row;
 use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::Status;
-use crate::protocol::optimal::Bounds;
 use crate::table::STATUS;
 
 /// Number of points at which a function is evaluated before its least value is refined. Chosen: many for each extremum of a quotient of cubics.
 const SCAN_POINTS: u32 = 2000;
 
-pub fn check(row: &Row, context: &Context) -> Verdict {
-    let coefficients = [number(row, "alpha_2"), number(row, "alpha_3"), number(row, "t_f")];
-    let (Some(problem), [Some(alpha_2), Some(alpha_3), Some(t_f)]) = (transition(row), coefficients) else {
-        return Verdict::unchecked("an axis is missing");
-    };
-    let Some(state) = state_law(row) else { return Verdict::unchecked("the law is unknown") };
+pub fn check(row: &Row, context: &Context) -> Checked {
+    let (problem, t_f, state) = (transition(row)?, axis(row, "t_f")?, state_law(row)?);
+    let (alpha_2, alpha_3) = (axis(row, "alpha_2")?, axis(row, "alpha_3")?);
     let a_2 = if context.relative[0] { alpha_2 } else { alpha_2 * t_f };
     let a_3 = if context.relative[1] { alpha_3 } else { alpha_3 * t_f * t_f };
     let form = context.friction;
@@ -29,22 +24,22 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
     let mut verdict = Verdict::default();
     let slack = cubic.slack();
     if slack.abs() < 1e-9 {
-        return Verdict::unchecked("within 1e-9 of the border of feasibility");
+        return Err("within 1e-9 of the border of feasibility");
     }
     let v_ceiling = number(row, "v_ceiling").unwrap_or(f64::INFINITY);
-    let bounds = Bounds::new(context.bounded).with_v_ceiling(v_ceiling);
+    let task = Task::new(&problem, t_f, context.bounded);
     let has_ceiling = state == StateLaw::Ageing && v_ceiling.is_finite();
     let optimum =
         (state != StateLaw::Ageing).then(|| relaxed::certify(&mut verdict, &problem, state, (t_f, v_ceiling)));
     let is_late = match &optimum {
         Some(optimum) => optimum.status == Status::Infeasible,
-        None => context.bounded && t_f < min_duration(&problem),
+        None => task.is_feasible() == Some(false),
     };
     let is_short = has_ceiling && word(row, STATUS) == Some("infeasible");
     let infeasible = slack <= 0.0 || is_late || is_short;
     verdict.status(row, infeasible);
     if infeasible || word(row, STATUS) == Some("infeasible") {
-        return verdict;
+        return Ok(verdict);
     }
     let work = cubic.work();
     verdict.compare(row, "v_min", Some(cubic.v_min()), None);
@@ -56,14 +51,14 @@ pub fn check(row: &Row, context: &Context) -> Verdict {
         None => verdict.miss("the independent integrator failed"),
     }
     match optimum {
-        _ if context.friction == Friction::Regularised => arcsinh::compare(&mut verdict, row, &problem, t_f, work),
+        _ if form == Friction::Regularised => arcsinh::compare(&mut verdict, row, &problem, t_f, work),
         _ if has_ceiling => {
             verdict.miss("the optimum of ageing under a velocity ceiling: the table optimal has its check")
         }
         Some(optimum) => compare_gap(&mut verdict, row, optimum.value, work),
-        None => compare(&mut verdict, row, (&problem, t_f), work, bounds),
+        None => task.compare_gap(&mut verdict, row, work),
     }
-    verdict
+    Ok(verdict)
 }
 
 /// A cubic shortcut over `x = t/t_f`.

@@ -3,23 +3,31 @@
 use super::Verdict;
 use crate::dataset::Row;
 use crate::model::{Law, StateLaw};
-use crate::numerics::radau::radau;
+use crate::numerics::radau::{NODES, Nodes, radau};
 use crate::protocol::{Moment, Motion, SpringBlock};
 
 /// A traced protocol, with its work and its errors in the equations.
 pub struct Followed {
+    state_law: StateLaw,
+    slider: SpringBlock,
     motion: Box<dyn Motion>,
     /// Parameters and moments, in the order of time.
     pub samples: Vec<(f64, Moment)>,
+    /// The time that each moment stands for in an integral.
+    weights: Vec<f64>,
     /// `int tau v dt`.
     pub work: f64,
     /// Greatest relative error of friction, and of theta as `int G(theta v) dt` over an interval.
     pub equation: f64,
+    /// Sums of the changes of theta without sign, of those by its equation, and of their rounding errors.
+    changes: [f64; 3],
     /// Greatest error of the change of the spring force `tau + m v'` as `k int v_c - v dt`, relative to the transmitted force.
     pub control: f64,
+    /// The transmitted force.
+    passed: f64,
     /// Greatest spring force, and greatest force by the control velocity alone, in units of `a`.
     pub force: f64,
-    pub reach: f64,
+    reach: f64,
 }
 
 /// Rounding of the slope at the end of a polynomial through sixteen values, in units of the values. Chosen: thirty times the sum, 640, of
@@ -29,70 +37,130 @@ const SLOPE_ROUNDING: f64 = 2e4 * f64::EPSILON;
 /// Rounding of a time in the slopes of a polynomial through sixteen of them. Chosen: four roundings for each value.
 const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
+/// Relative error of theta above which an interval may be split. Chosen: a hundredth of the default `rtol`.
+const RESOLVED_RTOL: f64 = 1e-12;
+
+/// Change of theta, relative to itself, whose error counts. Chosen: its rounding is then below the default `rtol`.
+const LEAST_CHANGE: f64 = 1e-3;
+
+/// Half of an interval: moments at the nodes of the rule, and what the rule needs for integrals over time.
+struct Half {
+    start: Moment,
+    places: Nodes,
+    at: [Moment; NODES],
+    times: Nodes,
+    /// Derivative of the time by the part of the half.
+    dt: Nodes,
+}
+
+impl Half {
+    fn new(motion: &dyn Motion, [from, to]: [f64; 2]) -> Half {
+        let (rule, start) = (radau(), motion.at(from));
+        let places = rule.u.map(|u| from * (1.0 - u) + to * u);
+        let at = places.map(|s| motion.at(s));
+        let times = at.map(|moment| moment.t - start.t);
+        Half { start, places, at, times, dt: rule.slopes(&times) }
+    }
+
+    fn integral(&self, f: &dyn Fn(&Moment) -> f64) -> f64 {
+        self.at.iter().zip(&self.dt).zip(&radau().w).map(|((at, dt), w)| w * f(at) * dt).sum()
+    }
+}
+
 impl Followed {
     /// Follows a motion with ageing of a block on a spring, from steady sliding if the spring is elastic.
     pub fn new(motion: Box<dyn Motion>, slider: &SpringBlock) -> Followed {
-        Followed::under(StateLaw::Ageing, motion, slider)
+        Followed::under(StateLaw::Ageing, motion, slider, 0)
     }
 
-    /// Follows a motion under an evolution law of the state.
-    pub fn under(state_law: StateLaw, motion: Box<dyn Motion>, slider: &SpringBlock) -> Followed {
-        let SpringBlock { law: Law { a, b }, k, m } = *slider;
-        let rule = radau();
+    /// Follows a motion under an evolution law of the state, and halves intervals that are not resolved up to `splits` times.
+    pub fn under(state_law: StateLaw, motion: Box<dyn Motion>, slider: &SpringBlock, splits: u32) -> Followed {
         let first = motion.at(0.0);
         let mut followed = Followed {
+            state_law,
+            slider: *slider,
             motion,
             samples: vec![(0.0, first)],
+            weights: vec![0.0],
             work: 0.0,
             equation: 0.0,
+            changes: [0.0; 3],
             control: 0.0,
+            passed: 0.0,
             force: 0.0,
             reach: 0.0,
         };
-        let (mut passed, mut friction_error) = (0.0, 0.0f64);
-        let marks = followed.motion.landmarks();
-        for ends in marks.windows(2) {
-            let middle = 0.5 * (ends[0] + ends[1]);
-            let before = followed.motion.at(ends[0]).theta;
-            // An arrest takes no time.
-            if followed.motion.at(ends[1]).t == followed.motion.at(ends[0]).t {
-                continue;
-            }
-            let (mut growth, mut noise) = (0.0, 0.0f64);
-            for [from, to] in [[ends[0], middle], [middle, ends[1]]] {
-                let place = |u: f64| from * (1.0 - u) + to * u;
-                let start = followed.motion.at(from);
-                let at = rule.u.map(|u| followed.motion.at(place(u)));
-                let times = at.map(|moment| moment.t - start.t);
-                let dt = rule.slopes(&times);
-                let integral = |f: &dyn Fn(&Moment) -> f64| -> f64 {
-                    at.iter().zip(&dt).zip(&rule.w).map(|((at, dt), w)| w * f(at) * dt).sum()
-                };
-                growth += integral(&|at| state_law.rate(at.theta * at.v));
-                followed.work += integral(&|at| at.friction * at.v);
-                for Moment { t, v, theta, friction, .. } in at {
-                    noise = noise.max(TIME_ROUNDING * (t * (1.0 / theta).max(v) + 1.0));
-                    let error = (1.0 + a * v.ln() + b * theta.ln() - friction).abs() / (1.0 + friction.abs());
-                    friction_error = friction_error.max(error);
-                }
-                if k.is_finite() {
-                    let speeds = at.map(|moment| moment.v - start.v);
-                    let last = at.len() - 1;
-                    let force = at[last].friction + m * rule.slopes(&speeds)[last] / dt[last];
-                    let extension = |at: &Moment| k * (at.v_c.unwrap_or(at.v) - at.v);
-                    passed += integral(&extension);
-                    followed.reach += integral(&|at| extension(at).abs()).abs() / a;
-                    followed.force = followed.force.max(force.abs() / a);
-                    let lack = (force - first.friction - passed).abs() - SLOPE_ROUNDING * m * at[last].v / times[last];
-                    followed.control = followed.control.max(lack / (a * (1.0 + followed.reach)));
-                }
-                followed.samples.extend(rule.u.iter().map(|&u| place(u)).zip(at));
-            }
-            let theta = followed.motion.at(ends[1]).theta;
-            followed.equation = followed.equation.max(((theta - before - growth) / theta).abs() - noise);
+        for ends in followed.motion.landmarks().windows(2) {
+            let error = followed.interval([ends[0], ends[1]], splits);
+            followed.equation = followed.equation.max(error);
         }
-        followed.equation = followed.equation.max(friction_error);
+        followed.work = followed.integral(|at| at.friction * at.v);
         followed
+    }
+
+    /// Adds an interval, and returns its relative error of theta.
+    fn interval(&mut self, [from, to]: [f64; 2], splits: u32) -> f64 {
+        let (middle, state_law) = (0.5 * (from + to), self.state_law);
+        let [before, after] = [from, to].map(|s| self.motion.at(s));
+        // An arrest takes no time.
+        if after.t == before.t {
+            return 0.0;
+        }
+        let halves = [[from, middle], [middle, to]].map(|ends| Half::new(&*self.motion, ends));
+        let growth: f64 = halves.iter().map(|half| half.integral(&|at| state_law.rate(at.theta * at.v))).sum();
+        let rounding = |at: &Moment| TIME_ROUNDING * (at.t * (1.0 / at.theta).max(at.v) + 1.0);
+        let noise = halves.iter().flat_map(|half| &half.at).map(rounding).fold(0.0, f64::max);
+        let change = after.theta - before.theta;
+        let error = ((change - growth) / after.theta).abs() - noise;
+        if error > RESOLVED_RTOL && splits > 0 {
+            return self.interval([from, middle], splits - 1) + self.interval([middle, to], splits - 1);
+        }
+        let changes = [change.abs(), growth.abs(), noise * after.theta];
+        self.changes.iter_mut().zip(changes).for_each(|(sum, change)| *sum += change);
+        halves.iter().for_each(|half| self.add(half));
+        error.max(0.0)
+    }
+
+    /// Adds half of an interval.
+    fn add(&mut self, half: &Half) {
+        let SpringBlock { law: Law { a, b }, k, m } = self.slider;
+        let Half { start, places, at, times, dt } = half;
+        // Below the normal numbers a velocity has no logarithm.
+        for Moment { v, theta, friction, .. } in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
+            let error = (1.0 + a * v.ln() + b * theta.ln() - friction).abs() / (1.0 + friction.abs());
+            self.equation = self.equation.max(error);
+        }
+        if k.is_finite() {
+            let speeds = at.map(|moment| moment.v - start.v);
+            let last = at.len() - 1;
+            let force = at[last].friction + m * radau().slopes(&speeds)[last] / dt[last];
+            let extension = |at: &Moment| k * (at.v_c.unwrap_or(at.v) - at.v);
+            self.passed += half.integral(&extension);
+            self.reach += half.integral(&|at| extension(at).abs()).abs() / a;
+            self.force = self.force.max(force.abs() / a);
+            let off = (force - self.samples[0].1.friction - self.passed).abs();
+            let lack = off - SLOPE_ROUNDING * m * at[last].v / times[last];
+            self.control = self.control.max(lack / (a * (1.0 + self.reach)));
+        }
+        self.samples.extend(places.iter().copied().zip(*at));
+        self.weights.extend(dt.iter().zip(&radau().w).map(|(dt, w)| dt * w));
+    }
+
+    /// Relative error of the sum of all changes of theta without sign.
+    pub fn stretch(&self) -> f64 {
+        let [change, growth, noise] = self.changes;
+        ((growth - change).abs() - noise).max(0.0) / (change + LEAST_CHANGE * self.samples[0].1.theta)
+    }
+
+    /// The integral of a function of the moment over time.
+    pub fn integral(&self, f: impl Fn(&Moment) -> f64) -> f64 {
+        self.integral_along(|_, at| f(at))
+    }
+
+    /// The integral of a function of the moment before and the moment over time. The moment before lies on the same arc, also at the end of one.
+    pub fn integral_along(&self, f: impl Fn(&Moment, &Moment) -> f64) -> f64 {
+        let pairs = self.samples.windows(2).zip(&self.weights[1..]);
+        pairs.map(|(pair, dt)| f(&pair[0].1, &pair[1].1) * dt).sum()
     }
 
     /// The moment at a parameter.
@@ -152,11 +220,11 @@ impl Followed {
         size
     }
 
-    /// The time up to which the velocity is exactly 1.
-    pub fn time_at_floor(&self) -> f64 {
+    /// The time in the intervals whose middle is on a bound.
+    pub fn time_on(&self, bound: impl Fn(&Moment) -> bool) -> f64 {
         let marks = self.motion.landmarks();
-        let held = marks.windows(2).take_while(|ends| self.motion.at(0.5 * (ends[0] + ends[1])).v == 1.0);
-        held.last().map_or(0.0, |ends| self.motion.at(ends[1]).t)
+        let on = marks.windows(2).filter(|ends| bound(&self.motion.at(0.5 * (ends[0] + ends[1]))));
+        on.map(|ends| self.motion.at(ends[1]).t - self.motion.at(ends[0]).t).sum()
     }
 }
 

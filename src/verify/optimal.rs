@@ -1,20 +1,21 @@
-//! `optimal`: the traced optimum obeys the equations and conserves `C`, on the floor no higher velocity costs less: it is the extremal.
+//! `optimal`: the traced optimum obeys the equations and conserves `C`, and no bound holds it back from less work: it is the extremal.
 //!
-//! With the costate `beta` of `theta` the Hamiltonian `tau v - beta theta'` is `-C` all the way. Off the floor it is stationary in `v`,
-//! so `C = a v - (tau + a)/theta`; on the floor it rises with `v`.
+//! With the costate `beta` of `theta` the Hamiltonian `tau v - beta theta'` is `-C` all the way. Off the bounds it is stationary in `v`,
+//! so `C = a v - (tau + a)/theta`; on the floor it rises with `v`, on a ceiling it falls. What it falls by is the multiplier of the bound, whose
+//! integral is a derivative of the work.
 
-use super::clamped::{TIME_NOISE, Totals, Way};
 use super::motion::Followed;
-use super::verdict::state_law;
-use super::{Context, Verdict, arcsinh, number, relaxed, transition, word};
+use super::task::Task;
+use super::verdict::{Checked, axis, state_law};
+use super::{Context, Verdict, arcsinh, number, relaxed, transition};
 use crate::dataset::Row;
-use crate::model::{Friction, StateLaw, Transition};
-use crate::protocol::optimal::{self, Bounds};
+use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::protocol::optimal::{ArcKind, Bounds};
 use crate::protocol::{Moment, SpringBlock, Status};
-use crate::table::STATUS;
 
-/// The certified optimum of a transition with a given duration.
+/// The certified optimum of a task.
 pub struct Optimum {
+    task: Task,
     pub motion: Followed,
     pub work: f64,
     pub start: Moment,
@@ -22,68 +23,101 @@ pub struct Optimum {
     /// The conserved `C`, and its rounding error.
     pub c: f64,
     pub c_noise: f64,
+    /// Whether rounding leaves digits of the multipliers on the ceilings.
+    has_slopes: bool,
 }
 
-/// Shortest duration with `v >= 1`: the time on the floor from `1/v_i` to `1/v_f`.
-pub fn min_duration(problem: &Transition) -> f64 {
-    ((problem.v_i - problem.v_f).max(0.0) / (problem.v_i * (problem.v_f - 1.0))).ln_1p()
-}
+/// Distance from a ceiling, relative to 1 plus the ceiling, below which a moment is on it. Chosen: some roundings.
+const CEILING_RTOL: f64 = 1e-14;
 
-/// Distance from a ceiling, relative to 1 plus the ceiling, below which a moment counts as on it. Chosen: far above the errors of a motion.
-const CEILING_RTOL: f64 = 1e-9;
+/// Times that an interval of a motion may be halved. Chosen: layers at the ends of arcs are thin.
+const MAX_SPLITS: u32 = 6;
 
-/// Relative accuracy of the motions. Chosen: a hundredth of the default `rtol`.
-const MOTION_RTOL: f64 = 1e-12;
+/// Logarithm of the growth of an error on the ceilings, beyond which `C` does not determine the rest of the path. Derived: `e^12` roundings are 2e-11, a
+/// fraction of the default `rtol`.
+const MAX_GROWTH: f64 = 12.0;
 
-/// The optimum, if there is one, with its error as a difference of the column `optimum`.
-pub fn certify(verdict: &mut Verdict, problem: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Option<Optimum> {
-    let bounds: Bounds = bounds.into();
-    let (solved, motion) = optimal::motion(problem, t_f, bounds, MOTION_RTOL);
-    let Some(motion) = motion else {
-        verdict.miss("there is no motion of the optimum");
-        return None;
-    };
-    let Transition { law, v_i, v_f } = *problem;
-    let motion = Followed::new(motion, &SpringBlock { law, k: f64::INFINITY, m: 0.0 });
-    let mut conserved: Vec<(f64, f64)> = Vec::new();
-    let proven = matches!(solved.status, Status::Ok | Status::BelowBound);
-    let mut wrong = 0.0f64;
-    let near = |value: f64, ceiling: f64| {
-        ceiling.is_finite() && (value - ceiling).abs() <= CEILING_RTOL * (1.0 + ceiling.abs())
-    };
-    for &(_, Moment { v, theta, friction, beta, .. }) in &motion.samples {
-        let press = friction + law.a;
-        let at_floor = bounds.floor && v == 1.0;
-        if !at_floor && !near(v, bounds.v_ceiling) && !near(friction, bounds.tau_ceiling) {
-            conserved.push((law.a * v - press / theta, law.a * v + press.abs() / theta));
-            continue;
+/// Relative error of a duration that is ignored under ceilings. Chosen: that of the motions.
+const TIME_NOISE: f64 = 1e-12;
+
+/// Time on a bound, relative to `t_f`, below which rounding decides whether the protocol is ever on it. Chosen: ten times [`TIME_NOISE`].
+const MIN_TIME_RTOL: f64 = 1e-11;
+
+impl Task {
+    /// The bound on which a moment is.
+    fn arc(&self, &Moment { v, friction, .. }: &Moment) -> ArcKind {
+        let Bounds { floor, v_ceiling, tau_ceiling } = self.bounds;
+        let near = |value: f64, ceiling: f64| {
+            ceiling.is_finite() && (value - ceiling).abs() <= CEILING_RTOL * (1.0 + ceiling.abs())
+        };
+        match () {
+            () if floor && v == 1.0 => ArcKind::Floor,
+            () if near(v, v_ceiling) => ArcKind::VCeiling,
+            () if near(friction, tau_ceiling) => ArcKind::TauCeiling,
+            () => ArcKind::Free,
         }
-        let Some(beta) = beta else { continue };
-        let (pull, push) = (beta * (1.0 - theta * v), friction * v);
-        conserved.push((pull - push, beta.abs() * (1.0 + theta * v) + push.abs()));
-        // The Hamiltonian must not fall with the velocity on the floor, nor rise with it at a ceiling, except where friction is too low for
-        // a proof.
-        let fall = (press + beta * theta) / press.abs().max(law.a) * if at_floor { -1.0 } else { 1.0 };
-        wrong = wrong.max(if proven { fall } else { 0.0 });
     }
-    let (c, size) = conserved.iter().copied().min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((f64::NAN, f64::NAN));
-    let drift = conserved.iter().map(|(other, size)| (other - c).abs() / size).fold(0.0, f64::max);
-    let (start, end) = (motion.samples[0].1, motion.end());
-    let arrival = (start.theta * v_i - 1.0).abs() + (end.theta * v_f - 1.0).abs() + (end.t / t_f - 1.0).abs();
-    verdict.push("optimum", motion.equation + arrival + drift + wrong);
-    Some(Optimum { work: motion.work, start, end, c, c_noise: 1e-14 * size, motion })
-}
 
-/// Compares the work of the optimum and, where the row has one, the gap of the protocol `work` above it.
-pub fn compare(
-    verdict: &mut Verdict,
-    row: &Row,
-    (problem, t_f): (&Transition, f64),
-    work: Option<f64>,
-    bounds: impl Into<Bounds>,
-) {
-    let optimum = certify(verdict, problem, t_f, bounds);
-    compare_gap(verdict, row, optimum.map(|optimum| optimum.work), work);
+    /// The optimum, if there is one, with its error as a difference of the column `optimum`.
+    pub fn certify(&self, verdict: &mut Verdict) -> Option<Optimum> {
+        let (solved, motion) = self.solve();
+        let Some(motion) = motion else {
+            verdict.miss("there is no motion of the optimum");
+            return None;
+        };
+        let Task { problem: Transition { law, v_f, .. }, t_f, .. } = *self;
+        let rigid = SpringBlock { law, k: f64::INFINITY, m: 0.0 };
+        let motion = Followed::under(StateLaw::Ageing, motion, &rigid, MAX_SPLITS);
+        let slip = |kind| motion.integral(|at| if self.arc(at) == kind { at.v } else { 0.0 });
+        let (growth, slips) = (law.b / law.a - 1.0, [ArcKind::VCeiling, ArcKind::TauCeiling].map(slip));
+        let sits = self.sits() && (motion.end().v / v_f - 1.0).abs() <= 2.0 * f64::EPSILON;
+        if growth * slips[1] > MAX_GROWTH && !sits {
+            verdict.miss("paths that slide long on the friction ceiling");
+            return None;
+        }
+        let mut conserved: Vec<(f64, f64)> = Vec::new();
+        let proven = matches!(solved.status, Status::Ok | Status::BelowBound);
+        let mut wrong = 0.0f64;
+        for (_, at) in &motion.samples {
+            let &Moment { v, theta, friction, beta, .. } = at;
+            let (press, arc) = (friction + law.a, self.arc(at));
+            if arc == ArcKind::Free {
+                conserved.push((law.a * v - press / theta, law.a * v + press.abs() / theta));
+                continue;
+            }
+            // Without a costate theta is steady.
+            let Some(beta) = beta else {
+                conserved.push((-friction * v, friction.abs() * v));
+                continue;
+            };
+            let (pull, push) = (beta * (1.0 - theta * v), friction * v);
+            conserved.push((pull - push, beta.abs() * (1.0 + theta * v) + push.abs()));
+            // The Hamiltonian must not fall with the velocity on the floor, nor rise with it at a ceiling, except where friction is too low for
+            // a proof.
+            let sign = if arc == ArcKind::Floor { -1.0 } else { 1.0 };
+            wrong = wrong.max(if proven { sign * (press + beta * theta) / press.abs().max(law.a) } else { 0.0 });
+        }
+        let (c, size) = conserved.iter().copied().min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((f64::NAN, f64::NAN));
+        let drift = conserved.iter().map(|(other, size)| (other - c).abs() / size).fold(0.0, f64::max);
+        let (start, end) = (motion.samples[0].1, motion.end());
+        let arrival =
+            (start.theta / self.from() - 1.0).abs() + (end.theta * v_f - 1.0).abs() + (end.t / t_f - 1.0).abs();
+        let has_slopes = !sits && (slips[0] + slips[1]) * growth.abs().max(1.0) < MAX_GROWTH;
+        verdict.push("optimum", motion.equation + motion.stretch() + arrival + drift + wrong);
+        Some(Optimum { task: *self, work: motion.work, start, end, c, c_noise: 1e-14 * size, has_slopes, motion })
+    }
+
+    /// The optimum of a time that rounding does not distinguish from `t_f`.
+    pub fn near(&self) -> Option<Optimum> {
+        let at = |t_f: f64| Task { t_f, ..*self }.certify(&mut Verdict::default());
+        at(self.t_f * (1.0 + TIME_NOISE)).or_else(|| at(self.t_f * (1.0 - TIME_NOISE)))
+    }
+
+    /// Compares the work of the optimum and, where the row has one, the gap of the protocol `work` above it.
+    pub fn compare_gap(&self, verdict: &mut Verdict, row: &Row, work: Option<f64>) {
+        let optimum = self.certify(verdict);
+        compare_gap(verdict, row, optimum.map(|optimum| optimum.work), work);
+    }
 }
 
 /// Compares the least work, if it is known, and the gap of the protocol `work` above it.
@@ -97,202 +131,124 @@ pub fn compare_gap(verdict: &mut Verdict, row: &Row, least: Option<f64>, work: O
     }
 }
 
-/// Numbers of a protocol by integration.
-type Number = fn(&Totals) -> f64;
+impl Optimum {
+    /// The numbers of the protocol.
+    fn numbers(&self) -> [(&'static str, f64); 8] {
+        let on = |kind: ArcKind| self.motion.time_on(|at| self.task.arc(at) == kind);
+        [
+            ("work", self.work),
+            ("v_start", self.start.v),
+            ("v_end", self.end.v),
+            ("time_at_floor", on(ArcKind::Floor)),
+            ("time_at_v_ceiling", on(ArcKind::VCeiling)),
+            ("time_at_tau_ceiling", on(ArcKind::TauCeiling)),
+            ("hamiltonian", -self.c),
+            ("theta_max", self.motion.greatest(|at| at.theta)),
+        ]
+    }
 
-/// The columns of an optimum.
-const NUMBERS: [(&str, Number); 5] = [
-    ("work", |totals| totals.work),
-    ("v_start", |totals| totals.v_start),
-    ("v_end", |totals| totals.v_end),
-    ("hamiltonian", |totals| -totals.c),
-    ("theta_max", |totals| totals.theta_max),
-];
+    /// Derivatives of the work, and their rounding errors.
+    fn slopes(&self) -> [(&'static str, f64, f64); 6] {
+        let Law { a, .. } = self.task.problem.law;
+        // The multiplier of the bound of this kind.
+        let multiplier = |before: &Moment, at: &Moment, kind: ArcKind| {
+            let fall = -(at.friction + a + at.beta.unwrap_or(f64::NAN) * at.theta);
+            if self.task.arc(before) == kind { fall } else { 0.0 }
+        };
+        let by_tau = |before: &Moment, at: &Moment| multiplier(before, at, ArcKind::TauCeiling) * at.v / a;
+        let by_law = |before: &Moment, at: &Moment| at.v + by_tau(before, at);
+        let summed = |column, f: &dyn Fn(&Moment, &Moment) -> f64| {
+            (column, self.motion.integral_along(f), self.rounding(|at| f(at, at)))
+        };
+        let [start, end] = [self.start, self.end].map(|at| at.beta.unwrap_or(f64::NAN));
+        let (from, to) = (self.task.from(), 1.0 / self.task.problem.v_f);
+        [
+            summed("dwork_da", &|before, at| by_law(before, at) * at.v.max(f64::MIN_POSITIVE).ln()),
+            summed("dwork_db", &|before, at| by_law(before, at) * at.theta.ln()),
+            ("dwork_dv_i", start * from * from, 0.0),
+            ("dwork_dv_f", -end * to * to, 0.0),
+            summed("dwork_dv_ceiling", &|before, at| -multiplier(before, at, ArcKind::VCeiling)),
+            summed("dwork_dtau_ceiling", &|before, at| -by_tau(before, at)),
+        ]
+    }
 
-const TIMES: [(&str, Number); 3] = [
-    ("time_at_floor", |totals| totals.time_at_floor),
-    ("time_at_v_ceiling", |totals| totals.time_at_v_ceiling),
-    ("time_at_tau_ceiling", |totals| totals.time_at_tau_ceiling),
-];
+    /// The effect of the rounding of times on the integral of a function of the moment.
+    fn rounding(&self, f: impl Fn(&Moment) -> f64) -> f64 {
+        f64::EPSILON * self.task.t_f * self.motion.samples.iter().map(|(_, at)| f(at).abs()).fold(0.0, f64::max)
+    }
 
-/// Time on a bound, relative to `t_f`, below which rounding decides whether the protocol is ever on it. Chosen: ten times the noise of a
-/// time (`clamped.rs`).
-const MIN_TIME_RTOL: f64 = 1e-11;
+    /// Compares the numbers of a row of this optimum.
+    fn compare(&self, verdict: &mut Verdict, row: &Row, rtol: f64) {
+        let near = self.task.near();
+        let near = near.as_ref().unwrap_or(self);
+        let has_ceilings = self.task.bounds.has_ceilings();
+        let (t_f, found) = (self.task.t_f, self.numbers());
+        for ((column, expected), (_, other)) in found.into_iter().zip(near.numbers()) {
+            let is_time = column.starts_with("time");
+            let size = if is_time && !has_ceilings && expected == 0.0 { t_f } else { expected.abs() };
+            let own = if column == "hamiltonian" { self.c_noise } else { 0.0 };
+            let rounding = (other - expected).abs() + if is_time { TIME_NOISE * t_f } else { 0.0 };
+            let noise = own + if has_ceilings { rounding } else { 0.0 };
+            verdict.compare(row, column, Some(expected), Some(size + noise / rtol));
+        }
+        let times = [3, 4, 5].map(|place| found[place].1);
+        if !has_ceilings || times.iter().all(|&time| time == 0.0 || time > MIN_TIME_RTOL * t_f) {
+            let binding = match times.map(|time| time > 0.0) {
+                [_, true, true] => "both",
+                [_, true, false] => "v_ceiling",
+                [_, false, true] => "tau_ceiling",
+                _ => "none",
+            };
+            verdict.compare_word(row, "binding", binding);
+            let strategy = match self.start.v {
+                _ if times[0] > 0.0 => "floor",
+                v if v / self.task.problem.v_i - 1.0 > 2.0 * f64::EPSILON => "speed_up",
+                _ => "slow_down",
+            };
+            verdict.compare_word(row, "strategy", strategy);
+        }
+        verdict.compare(row, "friction_max", Some(self.motion.greatest(|at| at.friction)), None);
+        verdict.friction(row, self.motion.least(|at| at.friction));
+        if let (Some(work), Some(error)) = (number(row, "work"), number(row, "work_error")) {
+            let noise =
+                self.rounding(|at| at.friction * at.v) + (near.work - self.work).abs() + 0.1 * rtol * self.work.abs();
+            verdict.judge("work_error", (work - self.work).abs() <= error + noise, "a bound");
+        }
+        if !row.iter().any(|(column, _)| column.starts_with("dwork")) {
+            return;
+        }
+        if !self.has_slopes {
+            return verdict.miss("derivatives of rows that slide steadily on a ceiling");
+        }
+        for ((column, slope, noise), (_, other, _)) in self.slopes().into_iter().zip(near.slopes()) {
+            let size = if slope == 0.0 { 1.0 } else { slope.abs() };
+            verdict.compare(row, column, Some(slope), Some(size + (noise + (other - slope).abs()) / rtol));
+        }
+    }
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
-    let (Some(problem), Some(t_f)) = (transition(row), number(row, "t_f")) else {
-        return Verdict::unchecked("an axis is missing");
-    };
+    /// The kind of the arc at the start.
+    pub fn arc(&self) -> ArcKind {
+        self.task.arc(&self.start)
+    }
+}
+
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
+    let (problem, t_f) = (transition(row)?, axis(row, "t_f")?);
     if context.friction == Friction::Regularised {
         return arcsinh::check(row, &problem, t_f);
     }
-    match state_law(row) {
-        Some(StateLaw::Ageing) => {}
-        Some(law) => return relaxed::check(row, &problem, law),
-        None => return Verdict::unchecked("the law is unknown"),
+    let law = state_law(row)?;
+    if law != StateLaw::Ageing {
+        return relaxed::check(row, &problem, law);
     }
-    let ceilings = ["v_ceiling", "tau_ceiling"].map(|name| number(row, name).unwrap_or(f64::INFINITY));
-    let has_ceilings = ceilings.into_iter().any(f64::is_finite);
-    let way = Way::of(&problem, t_f, context.bounded, ceilings);
+    let [v_ceiling, tau_ceiling] = ["v_ceiling", "tau_ceiling"].map(|name| number(row, name).unwrap_or(f64::INFINITY));
+    let bounds = Bounds { floor: context.bounded, v_ceiling, tau_ceiling };
+    let task = Task::new(&problem, t_f, bounds);
     let mut verdict = Verdict::default();
-    let feasible = match has_ceilings {
-        true => way.is_feasible(),
-        false => Some(!context.bounded || t_f >= min_duration(&problem)),
-    };
-    match feasible {
-        None => verdict.miss("it is too close to the border of what is feasible"),
-        Some(feasible) => verdict.status(row, !feasible),
+    let is_infeasible = task.compare_status(&mut verdict, row);
+    task.compare_limits(&mut verdict, row, rtol);
+    if !is_infeasible && let Some(optimum) = task.certify(&mut verdict) {
+        optimum.compare(&mut verdict, row, rtol);
     }
-    compare_limits(&mut verdict, row, &way, rtol);
-    if feasible == Some(false) || word(row, STATUS) == Some("infeasible") {
-        return verdict;
-    }
-    // `C` does not determine the rest of the path after a long time at the floor.
-    let is_vague = number(row, "time_at_floor").is_some_and(|time| time > MAX_TIME_AT_FLOOR);
-    if is_vague || !has_ceilings {
-        let bounds = Bounds { floor: context.bounded, v_ceiling: ceilings[0], tau_ceiling: ceilings[1] };
-        followed(&mut verdict, row, (&problem, t_f), bounds, rtol);
-    }
-    if !is_vague && (has_ceilings || SLOPES.iter().any(|(column, _)| number(row, column).is_some())) {
-        integrated(&mut verdict, row, &way, rtol);
-    }
-    verdict
+    Ok(verdict)
 }
-
-/// Compares a row with its traced motion.
-fn followed(verdict: &mut Verdict, row: &Row, (problem, t_f): (&Transition, f64), bounds: Bounds, rtol: f64) {
-    let Some(optimum) = certify(verdict, problem, t_f, bounds) else { return };
-    let Optimum { motion, work, start, end, c, c_noise } = &optimum;
-    verdict.compare(row, "work", Some(*work), None);
-    verdict.compare(row, "v_start", Some(start.v), None);
-    verdict.compare(row, "v_end", Some(end.v), None);
-    let time_at_floor = if bounds.floor { motion.time_at_floor() } else { 0.0 };
-    verdict.compare(row, "time_at_floor", Some(time_at_floor), (time_at_floor == 0.0).then_some(t_f));
-    if !bounds.has_ceilings() {
-        verdict.compare(row, "time_at_v_ceiling", Some(0.0), Some(t_f));
-        verdict.compare(row, "time_at_tau_ceiling", Some(0.0), Some(t_f));
-        verdict.compare_word(row, "binding", "none");
-    }
-    verdict.compare(row, "hamiltonian", Some(-c), Some(c.abs() + c_noise / rtol));
-    verdict.compare(row, "theta_max", Some(motion.greatest(|at| at.theta)), None);
-    verdict.compare(row, "friction_max", Some(motion.greatest(|at| at.friction)), None);
-    verdict.friction(row, motion.least(|at| at.friction));
-    verdict.compare_word(row, "strategy", strategy(start.v, problem.v_i, time_at_floor));
-}
-
-fn strategy(v_start: f64, v_i: f64, time_at_floor: f64) -> &'static str {
-    match v_start {
-        _ if time_at_floor > 0.0 => "floor",
-        v if v > v_i => "speed_up",
-        _ => "slow_down",
-    }
-}
-
-/// Time at the floor beyond which the conserved `C` no longer determines the rest of the path. Derived: the effect of an error of `C`
-/// grows like `e^t`, and `e^12` roundings are 2e-11, a fraction of the default `rtol`.
-const MAX_TIME_AT_FLOOR: f64 = 12.0;
-
-/// Compares the least feasible numbers and the reason of an infeasible row.
-fn compare_limits(verdict: &mut Verdict, row: &Row, way: &Way, rtol: f64) {
-    if let Some(limits) = way.limits() {
-        let least = limits.as_ref().ok().map(|(least, _)| *least);
-        verdict.compare(row, "t_least", least, (least == Some(0.0)).then_some(way.t_f));
-        match limits {
-            _ if word(row, STATUS) != Some("infeasible") => verdict.demand_nothing(row, "bound"),
-            // Either of two equal ceilings.
-            Err(ceilings) if ceilings.len() > 1 => {}
-            Err(ceilings) => ceilings.iter().for_each(|ceiling| verdict.compare_word(row, "bound", ceiling.name())),
-            Ok((least, _)) => {
-                verdict.compare_word(row, "bound", if way.t_f <= least { "too_fast" } else { "too_slow" });
-            }
-        }
-    }
-    // Ten `rtol` above a least ceiling a protocol exists, ten below none does.
-    let near = 10.0 * rtol;
-    let below_above = |least: f64| [-near, near].map(|part| least + part * least.abs());
-    let under = |v_ceiling: f64, tau_ceiling: f64| Way { v_ceiling, tau_ceiling, ..*way }.is_feasible();
-    type Under<'a> = &'a dyn Fn(f64) -> Option<bool>;
-    let ceilings: [(&str, Under<'_>); 2] = [
-        ("v_ceiling_least", &|v_ceiling| under(v_ceiling, way.tau_ceiling)),
-        ("tau_ceiling_least", &|tau_ceiling| under(way.v_ceiling, tau_ceiling)),
-    ];
-    for (column, under) in ceilings {
-        match under(f64::INFINITY) {
-            Some(true) => verdict.demand(row, column),
-            Some(false) => verdict.demand_nothing(row, column),
-            None => {}
-        }
-        let Some(least) = number(row, column) else { continue };
-        let [below, above] = below_above(least).map(under);
-        let holds = below != Some(true) && above != Some(false);
-        verdict.judge(column, holds, "least feasible");
-    }
-}
-
-/// Compares a row with the protocol of its own `C` and the next steps of Newton's method, integrated.
-fn integrated(verdict: &mut Verdict, row: &Row, way: &Way, rtol: f64) {
-    let (Some(hamiltonian), Some(v_start), Some(v_end)) =
-        (number(row, "hamiltonian"), number(row, "v_start"), number(row, "v_end"))
-    else {
-        return verdict.miss("a column is missing: hamiltonian, v_start or v_end");
-    };
-    let sitting = way.sitting();
-    let sits = sitting.is_some();
-    // Theta rises first and falls at the end.
-    let turns = v_start * way.from < 1.0 && v_end > way.v_f;
-    let Some(solution) = sitting.or_else(|| way.solve(-hamiltonian, turns)) else {
-        return verdict.miss("the integrator did not get there");
-    };
-    let found = solution.totals;
-    for (column, number) in NUMBERS {
-        let expected = number(&found);
-        verdict.compare(row, column, Some(expected), Some(expected.abs() + solution.noise(number) / rtol));
-    }
-    for (column, time) in TIMES {
-        let noise = solution.noise(time) + TIME_NOISE * way.t_f;
-        verdict.compare(row, column, Some(time(&found)), Some(time(&found) + noise / rtol));
-    }
-    let times = TIMES.map(|(_, time)| time(&found));
-    if times.iter().all(|&time| time == 0.0 || time > MIN_TIME_RTOL * way.t_f) {
-        let on = times.map(|time| time > 0.0);
-        let binding = match on {
-            [_, true, true] => "both",
-            [_, true, false] => "v_ceiling",
-            [_, false, true] => "tau_ceiling",
-            _ => "none",
-        };
-        verdict.compare_word(row, "binding", binding);
-        verdict.compare_word(row, "strategy", strategy(found.v_start, 1.0 / way.from, times[0]));
-    }
-    let [least, greatest] = way.friction(&solution);
-    verdict.compare(row, "friction_max", Some(greatest), None);
-    verdict.friction(row, least);
-    if let (Some(work), Some(error)) = (number(row, "work"), number(row, "work_error")) {
-        let noise = solution.noise(|totals| totals.work) + 0.1 * rtol * found.work.abs();
-        verdict.judge("work_error", (work - found.work).abs() <= error + noise, "a bound");
-    }
-    if sits {
-        return verdict.miss("derivatives of rows that slide steadily on a ceiling");
-    }
-    for (column, slope) in SLOPES {
-        let slope = |totals: &Totals| slope(way, totals);
-        let expected = slope(&found);
-        let size = if expected == 0.0 { 1.0 } else { expected.abs() };
-        verdict.compare(row, column, Some(expected), Some(size + solution.noise(slope) / rtol));
-    }
-    // `W + C t` of a neighbouring protocol must not be less.
-    let cost = found.work + found.c * found.time;
-    verdict.push("beaten", ((cost - found.varied) / found.work.abs()).max(0.0));
-}
-
-/// A derivative of the work.
-type Slope = fn(&Way, &Totals) -> f64;
-
-const SLOPES: [(&str, Slope); 6] = [
-    ("dwork_da", |_, totals| totals.by_law[0]),
-    ("dwork_db", |_, totals| totals.by_law[1]),
-    ("dwork_dv_i", |way, totals| -totals.costate[0] * way.from * way.from),
-    ("dwork_dv_f", |way, totals| totals.costate[1] / (way.v_f * way.v_f)),
-    ("dwork_dv_ceiling", |_, totals| -totals.pressure[0]),
-    ("dwork_dtau_ceiling", |_, totals| -totals.pressure[1]),
-];

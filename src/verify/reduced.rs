@@ -5,6 +5,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
+use super::verdict::Checked;
 use super::{Context, Verdict, gap, number, units};
 use crate::dataset::{Cell, Row};
 use crate::grid::Quantity;
@@ -62,13 +63,11 @@ struct Reduced {
 }
 
 /// Checks a row as it was `written`, in `units`.
-pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Verdict {
-    let Some(sweep) = landscape(written, spec) else {
-        return Verdict::unchecked("its shortcuts are in a points file");
-    };
+pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Checked {
+    let sweep = landscape(written, spec).ok_or("its shortcuts are in a points file")?;
     let (stores, signal) = (sweep.optimum_cache(), Signal::default());
     let (Some(request), Some(optima)) = (sweep.requests.first(), stores.first()) else {
-        return Verdict::unchecked("its spec does not request it");
+        return Err("its spec does not request it");
     };
     let job = sweep.job(request, optima, &signal);
     let mut verdict = Verdict::default();
@@ -94,7 +93,7 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
                 let shortcut = shortcut(&sweep, row, &cells(&buffer, place), buffer.status[place]);
                 let mut shortcut = [(row, shortcut)];
                 units::scale(&mut shortcut, request.table, units, context.relative);
-                let found = gap::check(&shortcut[0].1, context);
+                let found = gap::check(&shortcut[0].1, context).unwrap_or_else(Verdict::unchecked);
                 verdict.differences.extend(found.differences);
                 found.unchecked.into_iter().for_each(|reason| verdict.miss(reason));
             }
@@ -113,7 +112,7 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ve
     if status != Some(Status::NotConverged) {
         reduced.compare(written, &sweep, &mut verdict);
     }
-    verdict
+    Ok(verdict)
 }
 
 /// The landscape of a row alone: its transition and time, and the coefficients of the sweep.
@@ -186,15 +185,13 @@ impl Reduced {
         let ok = self.status[Status::Ok as usize];
         verdict.compare(written, "shortcuts", Some(ok as f64), Some(1.0));
         for ((column, hundredths), [below, same]) in QUANTILES.iter().zip(self.quantiles) {
-            if ok == 0 {
-                verdict.demand_nothing(written, column);
-            } else if number(written, column).is_some() {
+            if ok > 0 && number(written, column).is_some() {
                 // A quantile is the least gap that so many shortcuts do not exceed.
                 let enough = 100 * (below + same) >= hundredths * ok;
                 let least = below == 0 || 100 * below < hundredths * ok;
                 verdict.push(column, if same > 0 && enough && least { 0.0 } else { f64::INFINITY });
             } else {
-                verdict.demand(written, column);
+                verdict.demand(written, column, ok > 0);
             }
         }
         for ((column, _), count) in CLASSES.iter().zip(self.classes) {

@@ -1,8 +1,8 @@
 //! `regularised`: the traced protocol obeys the equations, arrives, its control moves the spring, and off its pieces it is the optimum.
 
 use super::motion::Followed;
-use super::optimal::{certify, min_duration};
-use super::verdict::{Context, Verdict, number, transition, word};
+use super::task::{Task, min_duration};
+use super::verdict::{Checked, Context, Verdict, axis, transition, word};
 use crate::dataset::Row;
 use crate::protocol::{Moment, SpringBlock, regularised};
 use crate::table::STATUS;
@@ -21,37 +21,34 @@ fn drift(followed: &Followed, a: f64, (c, corner): (f64, f64), [delta_t, t_f]: [
     kept.filter(|at| corner == 0.0 || (at.t - corner).abs() > delta_t).map(drift).fold(0.0, f64::max)
 }
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
-    let numbers = ["t_f", "k", "m", "delta_t"].map(|name| number(row, name));
-    let (Some(problem), [Some(t_f), Some(k), Some(m), Some(delta_t)]) = (transition(row), numbers) else {
-        return Verdict::unchecked("an axis is missing");
-    };
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
+    let (problem, t_f, delta_t) = (transition(row)?, axis(row, "t_f")?, axis(row, "delta_t")?);
+    let slider = SpringBlock { law: problem.law, k: axis(row, "k")?, m: axis(row, "m")? };
     let mut verdict = Verdict::default();
-    let overlaps = 2.0 * delta_t > t_f || context.bounded && t_f < min_duration(&problem);
+    let overlaps = 2.0 * delta_t > t_f || context.bounded && t_f < min_duration(&problem, true);
     let infeasible = word(row, STATUS) == Some("infeasible");
     if infeasible && !overlaps && !context.bounded {
         verdict.miss("optima that nearly come to rest");
-        return verdict;
+        return Ok(verdict);
     }
     if overlaps || infeasible {
         verdict.status(row, overlaps);
-        return verdict;
+        return Ok(verdict);
     }
     if word(row, STATUS) == Some("unproven") {
         verdict.miss("status is unproven");
-        return verdict;
+        return Ok(verdict);
     }
-    ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| verdict.demand(row, column));
-    let slider = SpringBlock { law: problem.law, k, m };
+    ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| verdict.demand(row, column, true));
     let (_, motion) = regularised::motion(&slider, (problem.v_i, problem.v_f), t_f, delta_t, context.bounded, rtol);
     let Some(motion) = motion else {
         verdict.push("motion", f64::INFINITY);
-        return verdict;
+        return Ok(verdict);
     };
-    let Some(optimum) = certify(&mut verdict, &problem, t_f, context.bounded) else { return verdict };
+    let Some(optimum) = Task::new(&problem, t_f, context.bounded).certify(&mut verdict) else { return Ok(verdict) };
     let followed = Followed::new(motion, &slider);
     let arrival = (followed.end().theta * problem.v_f - 1.0).abs();
-    let corner = if context.bounded { optimum.motion.time_at_floor() } else { 0.0 };
+    let corner = if context.bounded { optimum.motion.time_on(|at| at.v == 1.0) } else { 0.0 };
     let drift = drift(&followed, problem.law.a, (optimum.c, corner), [delta_t * (1.0 + rtol), t_f]);
     verdict.push("motion", followed.equation + arrival + drift);
     verdict.push("control", followed.control);
@@ -68,5 +65,5 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     if (v[0] - 1.0).abs() > 100.0 * rtol && friction_min > 0.0 {
         verdict.compare_word(row, STATUS, if v[0] < 1.0 { "below_bound" } else { "ok" });
     }
-    verdict
+    Ok(verdict)
 }

@@ -2,9 +2,9 @@
 
 use super::gap::Cubic;
 use super::motion::Followed;
-use super::optimal::{compare, min_duration};
 use super::route::integrate;
-use super::verdict::NEGATIVE;
+use super::task::{Task, min_duration};
+use super::verdict::{Checked, NEGATIVE, axis};
 use super::{Context, Verdict, number, transition, word};
 use crate::dataset::Row;
 use crate::model::Transition;
@@ -13,28 +13,26 @@ use crate::protocol::shortcut::{Case, find};
 use crate::protocol::{Moment, SpringBlock};
 use crate::table::STATUS;
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
-    let (Some(problem), Some(t_f), Some(name)) = (transition(row), number(row, "t_f"), word(row, "family")) else {
-        return Verdict::unchecked("an axis is missing");
-    };
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
+    let (problem, t_f) = (transition(row)?, axis(row, "t_f")?);
+    let name = word(row, "family").ok_or("an axis is missing")?;
     let case = Case { transition: problem, t_f, tau_ceiling: number(row, "tau_ceiling").unwrap_or(f64::INFINITY) };
     if !matches!(word(row, STATUS), Some("ok" | "below_bound" | NEGATIVE | "infeasible")) {
-        return Verdict::unchecked("status is neither ok, below_bound, negative_friction nor infeasible");
+        return Err("status is neither ok, below_bound, negative_friction nor infeasible");
     }
-    let Some(bound) = obstacle(&case, name, context.bounded) else {
-        return Verdict::unchecked("too close to the border to determine whether the family has a member");
-    };
+    let bound = obstacle(&case, name, context.bounded)
+        .ok_or("too close to the border to determine whether the family has a member")?;
     let mut verdict = Verdict::default();
     verdict.status(row, bound.is_some());
     if let Some(bound) = bound {
         verdict.compare_word(row, "bound", bound);
     }
     if bound.is_some() || word(row, STATUS) == Some("infeasible") {
-        return verdict;
+        return Ok(verdict);
     }
     let Some(Ok(motion)) = find(name).map(|family| family.motion(&case, rtol)) else {
         verdict.push("motion", f64::INFINITY);
-        return verdict;
+        return Ok(verdict);
     };
     let followed = Followed::new(motion, &SpringBlock { law: problem.law, k: f64::INFINITY, m: 0.0 });
     let miss = followed.end().theta * problem.v_f - 1.0;
@@ -50,8 +48,8 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
     // The optimum of this family has its ceiling.
     let ceiling = if name == "bounded_friction" { case.tau_ceiling } else { f64::INFINITY };
     let bounds = Bounds::new(context.bounded).with_tau_ceiling(ceiling);
-    compare(&mut verdict, row, (&problem, t_f), Some(followed.work), bounds);
-    verdict
+    Task::new(&problem, t_f, bounds).compare_gap(&mut verdict, row, Some(followed.work));
+    Ok(verdict)
 }
 
 /// Distance of a moment from the bound of its family, and the size of its terms.
@@ -114,7 +112,7 @@ fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static 
         room if room < -SIGN_RTOL => Some(Some(bound)),
         _ => None,
     };
-    let spare = settle("time", t_f - min_duration(&case.transition), t_f);
+    let spare = settle("time", t_f - min_duration(&case.transition, true), t_f);
     if bounded && v_f < v_i && spare != Some(None) {
         return spare;
     }
@@ -125,7 +123,6 @@ fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static 
             let slack = Cubic::new(&case.transition, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f)).slack();
             settle("velocity", slack, 1.0)
         }
-        "bounded_velocity" if v_i == 1.0 || v_f == 1.0 => Some(Some("velocity")),
         "bounded_velocity" if v_f < v_i => spare,
         "bounded_friction" => match settle("friction", tau_ceiling - highest, highest.abs() + 1.0) {
             Some(None) if v_f > v_i && tau_ceiling.is_finite() => {

@@ -1,106 +1,59 @@
-//! `stability`: all roots of the characteristic polynomial at once, by simultaneous iteration with 32 digits.
+//! `stability`: the roots of the characteristic polynomial with 32 digits: a real one by bisection, the others from what is left.
 
-use super::verdict::{Context, Verdict, number, state_law, transition};
+use super::motion::bisect;
+use super::verdict::{Checked, Context, Verdict, axis, number, state_law, transition};
 use super::{arcsinh, hopf};
 use crate::dataset::Row;
 use crate::model::{Friction, Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 
-type Complex = [DoubleDouble; 2];
+/// Bisections of a real root. Derived: 32 digits of a root by 50 decades below its bound.
+const BISECTIONS: u32 = 280;
 
-const ZERO: DoubleDouble = DoubleDouble::new(0.0);
-const ONE: Complex = [DoubleDouble::new(1.0), ZERO];
-
-fn difference(x: Complex, y: Complex) -> Complex {
-    [x[0] - y[0], x[1] - y[1]]
-}
-
-fn product(x: Complex, y: Complex) -> Complex {
-    [x[0] * y[0] - x[1] * y[1], x[0] * y[1] + x[1] * y[0]]
-}
-
-fn quotient(x: Complex, y: Complex) -> Complex {
-    let square = y[0] * y[0] + y[1] * y[1];
-    let [re, im] = product(x, [y[0], -y[1]]);
-    [re / square, im / square]
-}
-
-fn size(x: Complex) -> f64 {
-    x[0].high.hypot(x[1].high)
-}
-
-/// Greatest number of iterations. Chosen: roots that differ by many decades separate by a constant factor in each iteration.
-const ROUNDS: u32 = 2000;
-
-/// The roots of `x^n + c[n - 1] x^(n - 1) + … + c[0]` (Weierstrass, Durand, Kerner); `None` if the iteration does not converge.
-fn roots<const N: usize>(c: [DoubleDouble; N]) -> Option<[Complex; N]> {
-    let value = |x: Complex| {
-        c.iter().rev().fold(ONE, |sum, &c| {
-            let [re, im] = product(sum, x);
-            [re + c, im]
-        })
-    };
-    // Start on a circle that encloses all roots, at places that are not real, no two of them conjugate.
-    let bound = (0..N).map(|n| (2.0 * c[n].high.abs()).powf(1.0 / (N - n) as f64)).fold(0.0, f64::max);
-    let mut found = std::array::from_fn(|n| {
-        let angle = 0.4 + 2.0 * std::f64::consts::PI * n as f64 / N as f64;
-        [bound * angle.cos(), bound * angle.sin()].map(DoubleDouble::new)
-    });
-    for _ in 0..ROUNDS {
-        let mut rests = true;
-        for n in 0..N {
-            let x = found[n];
-            let others = (0..N).filter(|&m| m != n).fold(ONE, |all, m| product(all, difference(x, found[m])));
-            let step = quotient(value(x), others);
-            found[n] = difference(x, step);
-            rests &= size(step) <= 1e-24 * size(x);
-        }
-        if rests {
-            return Some(found);
-        }
+/// A real root of `x^3 + c_2 x^2 + c_1 x + c_0` with `c_0 > 0`.
+fn real_root(c: [DoubleDouble; 3]) -> DoubleDouble {
+    // Fujiwara's bound of all roots.
+    let bound = 2.0 * (0..3).map(|n| c[n].high.abs().powf(1.0 / (3 - n) as f64)).fold(0.0, f64::max);
+    let (mut low, mut high) = (DoubleDouble::new(-bound), DoubleDouble::new(0.0));
+    for _ in 0..BISECTIONS {
+        let x = (low + high) * DoubleDouble::new(0.5);
+        *if (((x + c[2]) * x + c[1]) * x + c[0]).high > 0.0 { &mut high } else { &mut low } = x;
     }
-    None
+    high
 }
 
-/// Growth rate, frequency and decay rate over `v` from all eigenvalues.
-fn modes(mut roots: Vec<Complex>) -> [f64; 3] {
-    let is_real = |root: &Complex| root[1].high.abs() <= 1e-20 * size(*root);
-    // The pair first, then by descending real part.
-    roots.sort_by(|x, y| is_real(x).cmp(&is_real(y)).then(y[0].high.total_cmp(&x[0].high)));
-    let frequency = if is_real(&roots[0]) { 0.0 } else { roots[0][1].high.abs() };
-    [roots[0][0].high, frequency, roots.last().map_or(f64::NAN, |root| root[0].high)]
+/// Growth rate, frequency and decay rate over `v` from the roots of `x^2 + p x + q` and perhaps another one.
+fn modes([p, q]: [DoubleDouble; 2], other: Option<f64>) -> [f64; 3] {
+    let half = p * DoubleDouble::new(0.5);
+    let square = (half * half - q).high;
+    if square < 0.0 {
+        return [-half.high, (-square).sqrt(), other.unwrap_or(f64::NAN)];
+    }
+    // The smaller root follows from the product.
+    let larger = -(half.high + square.sqrt().copysign(half.high));
+    let all = [larger, q.high / larger].into_iter().chain(other);
+    [all.clone().fold(f64::NEG_INFINITY, f64::max), 0.0, all.fold(f64::INFINITY, f64::min)]
 }
 
 /// Compares the borders of smooth optima: bisections of Legendre's condition `u G''/G' <= a/(tau + a)` at one velocity.
 fn smoothness(verdict: &mut Verdict, row: &Row, problem: &Transition) {
     let Law { a, b } = problem.law;
-    let bisected = |holds: &dyn Fn(f64) -> bool| {
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            *if holds(middle) { &mut low } else { &mut high } = middle;
-        }
-        low
-    };
     let [slow, fast] = [problem.v_i.min(problem.v_f), problem.v_i.max(problem.v_f)].map(f64::ln);
     let steady = 1.0 + (a - b) * if b > a { slow } else { fast };
     // At 10 times the steady velocity.
     let (ln_u, tau) = (10.0_f64.ln(), steady + a * 10.0_f64.ln());
-    let mixture = bisected(&|slip: f64| slip * (tau + a) <= a * (1.0 + slip * ln_u));
+    let mixture = bisect(0.0, 1.0, |slip: f64| slip * (tau + a) <= a * (1.0 + slip * ln_u));
     verdict.compare(row, "slip_fraction_smooth", (steady > 0.0).then_some(mixture), None);
     let tau = 1.0 - b * fast;
-    let interpolated = bisected(&|slip: f64| {
+    let interpolated = bisect(0.0, 1.0, |slip: f64| {
         let power = (-(1.0 - slip) * fast).exp();
         power > slip && slip * (1.0 - slip) * (tau + a) <= a * (power - slip)
     });
     verdict.compare(row, "law_eps_smooth", (tau > (b - a).max(0.0)).then_some(1.0 - interpolated), None);
 }
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
-    let numbers = number(row, "k").zip(number(row, "m"));
-    let (Some(problem), Some(state), Some((k, m))) = (transition(row), state_law(row), numbers) else {
-        return Verdict::unchecked("an axis is missing");
-    };
+pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
+    let (problem, state, k, m) = (transition(row)?, state_law(row)?, axis(row, "k")?, axis(row, "m")?);
     let double = DoubleDouble::new;
     let law = |v: f64| match context.friction {
         Friction::Log => problem.law,
@@ -140,7 +93,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Verdict {
         smoothness(&mut verdict, row, &problem);
     }
     eigenvalues(&mut verdict, row, law(problem.v_f), (k, m, problem.v_f));
-    verdict
+    Ok(verdict)
 }
 
 /// Compares the eigenvalues at steady sliding with `v`, from the roots of the characteristic polynomial.
@@ -156,14 +109,15 @@ fn eigenvalues(verdict: &mut Verdict, row: &Row, law: Law, (k, m, v): (f64, f64,
     let weakening = double(law.b) - a;
     let inertia = double(m) * double(v) * double(v);
     let (sum, c) = (inertia + a, double(k) - weakening);
-    let all = if m > 0.0 {
-        roots([double(k) / inertia, c / inertia, sum / inertia]).map(Vec::from)
+    let [growth, frequency, decay] = if m > 0.0 {
+        let [c_0, c_1, c_2] = [double(k) / inertia, c / inertia, sum / inertia];
+        let root = real_root([c_0, c_1, c_2]);
+        let q = -(c_0 / root);
+        // Of both formulas that with the smaller terms.
+        let p = if c_2.high < c_1.high.abs() / root.high.abs() { c_2 + root } else { (q - c_1) / root };
+        modes([p, q], Some(root.high))
     } else {
-        roots([double(k) / a, c / a]).map(Vec::from)
-    };
-    let Some([growth, frequency, decay]) = all.map(modes) else {
-        verdict.miss("two eigenvalues are too close to be distinguished");
-        return;
+        modes([c / a, double(k) / a], None)
     };
     // At the critical stiffness the growth rate is 0 and has no relative error.
     let modulus = growth.hypot(frequency);

@@ -3,7 +3,7 @@
 use super::hopf;
 use super::motion::{Followed, bisect};
 use super::route::integrate;
-use super::verdict::{Context, Verdict, number, state_law, transition, word};
+use super::verdict::{Checked, Context, Verdict, axis, number, state_law, transition, word};
 use crate::dataset::Row;
 use crate::model::{Law, StateLaw, Transition};
 use crate::protocol::{Motion, SpringBlock};
@@ -93,11 +93,8 @@ impl Events {
     }
 }
 
-pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
-    let numbers = number(row, "k").zip(number(row, "m"));
-    let (Some(problem), Some(state), Some((k, m))) = (transition(row), state_law(row), numbers) else {
-        return Verdict::unchecked("an axis is missing");
-    };
+pub fn check(row: &Row, _: &Context, rtol: f64) -> Checked {
+    let (problem, state, k, m) = (transition(row)?, state_law(row)?, axis(row, "k")?, axis(row, "m")?);
     let mut verdict = Verdict::default();
     let Transition { law, v_i, v_f } = problem;
     let hopf = hopf::Point::new(state, law, m * v_f * v_f);
@@ -111,25 +108,25 @@ pub fn check(row: &Row, _: &Context, rtol: f64) -> Verdict {
         ["v_peak", "v_trough"].iter().for_each(|column| verdict.compare(row, column, Some(v_f), None));
         verdict.compare(row, "settling_time", Some(0.0), Some(1.0));
         CYCLE.iter().chain(&["t_peak"]).for_each(|column| verdict.compare(row, column, None, None));
-        return verdict;
+        return Ok(verdict);
     }
     let step = VelocityStep { state_law: state, transition: problem, k, m };
     let Some(infinite) = diverges(&step) else {
         verdict.miss("steps without mass that an explicit integrator does not decide");
-        return verdict;
+        return Ok(verdict);
     };
     verdict.status(row, infinite);
     if infinite {
         verdict.compare_word(row, "outcome", "diverged");
     }
     if infinite || word(row, STATUS) == Some("infeasible") {
-        return verdict;
+        return Ok(verdict);
     }
     match follow(&mut verdict, step, rtol) {
         Ok(followed) => compare(&mut verdict, row, &problem, (k, m), &followed, rtol),
         Err(reason) => verdict.miss(reason),
     }
-    verdict
+    Ok(verdict)
 }
 
 /// Pieces of unit length over which a step without mass is followed, and the distance from steady sliding at which it has settled.
@@ -181,7 +178,7 @@ fn follow(verdict: &mut Verdict, step: VelocityStep, rtol: f64) -> Result<Follow
     let motion = motion.filter(|motion| motion.landmarks().len() <= MAX_INTERVALS);
     let motion = motion.ok_or("responses of more than 10,000 steps")?;
     let VelocityStep { state_law, transition: Transition { law, .. }, k, m } = step;
-    let followed = Followed::under(state_law, Box::new(motion), &SpringBlock { law, k, m });
+    let followed = Followed::under(state_law, Box::new(motion), &SpringBlock { law, k, m }, 0);
     verdict.push("motion", followed.equation);
     verdict.push("control", followed.control);
     Ok(followed)

@@ -21,6 +21,9 @@ pub struct Verdict {
     pub unchecked: Vec<&'static str>,
 }
 
+/// The verdict on a row, or the reason why it cannot be checked.
+pub type Checked = Result<Verdict, &'static str>;
+
 /// One comparison.
 #[derive(Debug)]
 pub struct Difference {
@@ -43,6 +46,7 @@ impl Verdict {
         other.unchecked.into_iter().for_each(|reason| self.miss(reason));
     }
 
+    /// The verdict on a row that cannot be checked.
     pub fn unchecked(reason: &'static str) -> Verdict {
         Verdict { unchecked: vec![reason], ..Verdict::default() }
     }
@@ -91,17 +95,10 @@ impl Verdict {
         self.differences.push(Difference { column, size, expected: expected.to_owned() });
     }
 
-    /// Records an error if a column that must have a number is null.
-    pub fn demand(&mut self, row: &Row, column: &'static str) {
-        if row.iter().any(|(name, cell)| name == column && *cell == Cell::Missing) {
-            self.judge(column, false, "a number");
-        }
-    }
-
-    /// Records an error if a column that must be null is not.
-    pub fn demand_nothing(&mut self, row: &Row, column: &'static str) {
-        if row.iter().any(|(name, cell)| name == column && *cell != Cell::Missing) {
-            self.judge(column, false, "nothing");
+    /// Records an error if a column that must have a value is null, or the reverse.
+    pub fn demand(&mut self, row: &Row, column: &'static str, exists: bool) {
+        if row.iter().any(|(name, cell)| name == column && (*cell != Cell::Missing) != exists) {
+            self.judge(column, false, if exists { "a number" } else { "nothing" });
         }
     }
 
@@ -109,14 +106,18 @@ impl Verdict {
     pub fn friction(&mut self, row: &Row, least: f64) {
         if least.abs() > MIN_FRICTION {
             let negative = least < 0.0;
-            let holds = word(row, STATUS).is_some_and(|status| (status == NEGATIVE) == negative);
-            self.judge(STATUS, holds, if negative { NEGATIVE } else { "not negative_friction" });
+            self.judge_status(row, negative, [NEGATIVE, "not negative_friction"]);
         }
     }
 
+    /// Compares whether the row is infeasible.
     pub fn status(&mut self, row: &Row, expected: bool) {
-        let holds = word(row, STATUS).is_some_and(|status| (status == "infeasible") == expected);
-        self.judge(STATUS, holds, if expected { "infeasible" } else { "not infeasible" });
+        self.judge_status(row, expected, ["infeasible", "not infeasible"]);
+    }
+
+    fn judge_status(&mut self, row: &Row, expected: bool, [name, other]: [&'static str; 2]) {
+        let holds = word(row, STATUS).is_some_and(|status| (status == name) == expected);
+        self.judge(STATUS, holds, if expected { name } else { other });
     }
 }
 
@@ -140,15 +141,17 @@ pub fn word<'a>(row: &'a Row, column: &str) -> Option<&'a str> {
     }
 }
 
-/// The evolution law of the state: ageing without such a column; `None` for an unknown word.
-pub fn state_law(row: &Row) -> Option<StateLaw> {
-    match word(row, "law") {
-        Some(word) => StateLaw::find(word),
-        None => Some(StateLaw::Ageing),
-    }
+/// The number of an axis.
+pub fn axis(row: &Row, name: &str) -> Result<f64, &'static str> {
+    number(row, name).ok_or("an axis is missing")
 }
 
-pub fn transition(row: &Row) -> Option<Transition> {
-    let law = Law { a: number(row, "a")?, b: number(row, "b")? };
-    Some(Transition { law, v_i: number(row, "v_i")?, v_f: number(row, "v_f")? })
+/// The evolution law of the state: ageing without such a column.
+pub fn state_law(row: &Row) -> Result<StateLaw, &'static str> {
+    word(row, "law").map_or(Some(StateLaw::Ageing), StateLaw::find).ok_or("the law is unknown")
+}
+
+pub fn transition(row: &Row) -> Result<Transition, &'static str> {
+    let law = Law { a: axis(row, "a")?, b: axis(row, "b")? };
+    Ok(Transition { law, v_i: axis(row, "v_i")?, v_f: axis(row, "v_f")? })
 }

@@ -1,0 +1,193 @@
+//! An optimal transition under bounds: which durations and ceilings are feasible.
+
+use super::route::integrate;
+use super::verdict::{Verdict, number, word};
+use crate::dataset::Row;
+use crate::model::{Law, Transition};
+use crate::protocol::optimal::{Bounds, Optimum};
+use crate::protocol::{Motion, Solved, optimal};
+use crate::table::STATUS;
+
+/// A transition to steady sliding in a given time, under bounds.
+#[derive(Debug, Clone, Copy)]
+pub struct Task {
+    pub problem: Transition,
+    /// State variable at the start, if it is not that of steady sliding at `v_i`.
+    pub theta: Option<f64>,
+    pub t_f: f64,
+    pub bounds: Bounds,
+}
+
+/// Least and greatest feasible time, or the ceiling that allows none, if it is one alone.
+type Limits = Result<(f64, f64), Option<&'static str>>;
+
+/// Relative distance from the border of the feasible region below which rounding decides. Chosen: a hundred times the tolerance of
+/// the integrator (`route.rs`).
+const BORDER_RTOL: f64 = 1e-11;
+
+/// Distance of a friction ceiling from steady sliding, in `mu_0 sigma`, below which rounding decides. Chosen: a hundred roundings.
+const STEADY_NOISE: f64 = 2e-14;
+
+/// Relative accuracy of the motions. Chosen: a hundredth of the default `rtol`.
+const MOTION_RTOL: f64 = 1e-12;
+
+impl Task {
+    /// The transition between steady sliding.
+    pub fn new(problem: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Task {
+        Task { problem: *problem, theta: None, t_f, bounds: bounds.into() }
+    }
+
+    /// The optimum and its motion.
+    pub fn solve(&self) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+        let Task { ref problem, theta, t_f, bounds } = *self;
+        match theta {
+            Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, MOTION_RTOL),
+            None => optimal::motion(problem, t_f, bounds, MOTION_RTOL),
+        }
+    }
+
+    /// State variable at the start.
+    pub fn from(&self) -> f64 {
+        self.theta.unwrap_or(1.0 / self.problem.v_i)
+    }
+
+    /// State variable at the end.
+    fn to(&self) -> f64 {
+        1.0 / self.problem.v_f
+    }
+
+    /// `ln theta` at both ends.
+    fn ends(&self) -> [f64; 2] {
+        [self.from().ln(), self.to().ln()]
+    }
+
+    fn steady_friction(&self, l: f64) -> f64 {
+        let Law { a, b } = self.problem.law;
+        1.0 + (b - a) * l
+    }
+
+    /// `ln(theta v)` on the ceilings of velocity and friction at `ln theta = l`.
+    fn caps(&self, l: f64) -> [f64; 2] {
+        let (v_f, Bounds { v_ceiling, tau_ceiling, .. }) = (self.problem.v_f, self.bounds);
+        let at_end = ((v_ceiling - v_f) / v_f).ln_1p();
+        [at_end + (l - self.ends()[1]), (tau_ceiling - self.steady_friction(l)) / self.problem.law.a]
+    }
+
+    fn cap(&self, l: f64) -> f64 {
+        let [v, tau] = self.caps(l);
+        v.min(tau)
+    }
+
+    /// Whether the ceilings allow steady sliding at the end, and nothing above its theta.
+    pub fn sits(&self) -> bool {
+        self.to() >= self.from() && self.cap(self.ends()[1]) == 0.0
+    }
+
+    /// `ln theta` between the ends at which the ceilings cross: both are linear in it.
+    fn crossing(&self) -> Option<f64> {
+        let [start, end] = self.ends();
+        let [before, after] = [start, end].map(|l| self.caps(l)).map(|[v, tau]| v - tau);
+        (before * after < 0.0).then(|| start + (end - start) * before / (before - after))
+    }
+
+    /// Time on the ceilings from one end to the other.
+    fn time_on_ceilings(&self) -> Option<f64> {
+        let [start, end] = self.ends();
+        let slope = |y: &[f64; 2]| [1.0, -y[0].exp() / self.t_f / self.cap(y[0]).exp_m1()];
+        let middle = self.crossing().unwrap_or(end);
+        let time = integrate(slope, [start, 0.0], (start, middle))?[1];
+        Some(self.t_f * integrate(slope, [middle, time], (middle, end))?[1])
+    }
+
+    /// The least and the greatest feasible time; `None` where rounding decides.
+    fn limits(&self) -> Option<Limits> {
+        let (ends, (from, to)) = (self.ends(), (self.from(), self.to()));
+        let Bounds { floor, v_ceiling, tau_ceiling } = self.bounds;
+        let rooms = ends.map(|l| (tau_ceiling - self.steady_friction(l)).abs());
+        if rooms.iter().any(|room| *room > 0.0 && *room < STEADY_NOISE) {
+            return None;
+        }
+        let [at_start, at_end] = ends.map(|l| self.cap(l));
+        if to <= from {
+            let (cap, l) = if at_end <= at_start { (at_end, ends[1]) } else { (at_start, ends[0]) };
+            if cap < 0.0 || (cap == 0.0 && to < from) {
+                let [v, tau] = self.caps(l);
+                return Some(Err((v != tau).then_some(if v < tau { "v_ceiling" } else { "tau_ceiling" })));
+            }
+            return Some(Ok((if to < from { self.time_on_ceilings()? } else { 0.0 }, f64::INFINITY)));
+        }
+        let least = if floor {
+            let room = tau_ceiling - (1.0 + self.problem.law.b * ends[1]);
+            match () {
+                () if v_ceiling < 1.0 => return Some(Err(Some("v_ceiling"))),
+                () if room.abs() < STEADY_NOISE => return None,
+                () if room < 0.0 => return Some(Err(Some("tau_ceiling"))),
+                () => ((to - from) / (1.0 - to)).ln_1p(),
+            }
+        } else {
+            to - from
+        };
+        // Above theta_1 theta can wait or turn; below it only where the ceilings allow steady sliding.
+        let allows = |l: f64| self.cap(l) > 0.0;
+        let waits = at_end >= 0.0 || allows(ends[0]) || self.crossing().is_some_and(allows);
+        Some(Ok((least, if waits { f64::INFINITY } else { self.time_on_ceilings()? })))
+    }
+
+    /// Whether there is a protocol; `None` where rounding decides.
+    pub fn is_feasible(&self) -> Option<bool> {
+        if self.theta.is_none() && !self.bounds.has_ceilings() {
+            let least = min_duration(&self.problem, self.bounds.floor);
+            return Some(if self.bounds.floor { self.t_f >= least } else { self.t_f > least });
+        }
+        let [start, end] = self.ends();
+        // Rounding of both ends, relative to their distance.
+        let noise = if start == end { 0.0 } else { 4.0 * f64::EPSILON * (1.0 + end.abs()) / (end - start).abs() };
+        let clear = |room: f64| (room.abs() > (BORDER_RTOL + noise) * self.t_f).then_some(room > 0.0);
+        match self.limits()? {
+            Err(_) => Some(false),
+            Ok((least, most)) => Some(clear(self.t_f - least)? && clear(most - self.t_f)?),
+        }
+    }
+
+    /// Compares whether the row is infeasible; true where it has no optimum.
+    pub fn compare_status(&self, verdict: &mut Verdict, row: &Row) -> bool {
+        let feasible = self.is_feasible();
+        match feasible {
+            None => verdict.miss("it is too close to the border of what is feasible"),
+            Some(feasible) => verdict.status(row, !feasible),
+        }
+        feasible == Some(false) || word(row, STATUS) == Some("infeasible")
+    }
+
+    /// Compares the least feasible numbers and the reason of an infeasible row.
+    pub fn compare_limits(&self, verdict: &mut Verdict, row: &Row, rtol: f64) {
+        if let Some(limits) = self.limits() {
+            let least = limits.ok().map(|(least, _)| least);
+            verdict.compare(row, "t_least", least, (least == Some(0.0)).then_some(self.t_f));
+            match limits {
+                _ if word(row, STATUS) != Some("infeasible") => verdict.demand(row, "bound", false),
+                Err(ceiling) => ceiling.into_iter().for_each(|ceiling| verdict.compare_word(row, "bound", ceiling)),
+                Ok((least, _)) => {
+                    verdict.compare_word(row, "bound", if self.t_f <= least { "too_fast" } else { "too_slow" });
+                }
+            }
+        }
+        let by_v = |v_ceiling: f64| Task { bounds: Bounds { v_ceiling, ..self.bounds }, ..*self }.is_feasible();
+        let by_tau = |tau_ceiling: f64| Task { bounds: Bounds { tau_ceiling, ..self.bounds }, ..*self }.is_feasible();
+        type Under<'a> = &'a dyn Fn(f64) -> Option<bool>;
+        let ceilings: [(&str, Under<'_>); 2] = [("v_ceiling_least", &by_v), ("tau_ceiling_least", &by_tau)];
+        for (column, under) in ceilings {
+            under(f64::INFINITY).into_iter().for_each(|exists| verdict.demand(row, column, exists));
+            let Some(least) = number(row, column) else { continue };
+            // Ten `rtol` above a least ceiling a protocol exists, ten below none does.
+            let [below, above] = [-10.0 * rtol, 10.0 * rtol].map(|part| under(least + part * least.abs()));
+            verdict.judge(column, below != Some(true) && above != Some(false), "least feasible");
+        }
+    }
+}
+
+/// Shortest duration: the time at `v = 1` with a floor, else at rest, from `1/v_i` to `1/v_f`; 0 for an acceleration.
+pub fn min_duration(&Transition { v_i, v_f, .. }: &Transition, floor: bool) -> f64 {
+    let rise = (v_i - v_f).max(0.0) / v_i;
+    if floor { (rise / (v_f - 1.0)).ln_1p() } else { rise / v_f }
+}
