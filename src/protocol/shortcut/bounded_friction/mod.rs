@@ -238,13 +238,12 @@ fn refine(mut path: FrictionPath, rtol: f64, stats: &mut SolverStats) -> Option<
         let pass = path.pass(accuracy, stats).ok()?;
         let (value, by_alpha) = path.residual(&pass);
         let step = -value / by_alpha;
-        let (change, change_of_v) = ((step / path.alpha).abs(), step.abs() * pass.max_ln_v_by_alpha);
-        let error = change.max(change_of_v);
+        let error = (step / path.alpha).abs().max(step.abs() * pass.max_ln_v_by_alpha);
         let is_fine = accuracy == fine;
         let stalls = step.abs() >= 0.5 * before || path.alpha + step == path.alpha;
         if is_fine && (error <= LAST_STEP_FRACTION * fine || stalls) {
             // A step within the tolerance is none of rounding.
-            let noise = if error <= rtol { 0.0 } else { change_of_v };
+            let noise = if error <= rtol { 0.0 } else { step.abs() * pass.max_visible_by_alpha };
             return Some(Member { path, pass, noise });
         }
         if !step.is_finite() {

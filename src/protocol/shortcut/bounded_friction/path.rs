@@ -71,8 +71,10 @@ pub(super) struct Pass {
     pub w: f64,
     /// Derivative of `w` with respect to `alpha_3`.
     pub w_by_alpha: f64,
-    /// Greatest derivative of `ln v` with respect to `alpha_3` on the path, over `1 + ln^2(theta v)` where slip is slow.
+    /// Greatest derivative of `ln v` with respect to `alpha_3` on the path.
     pub max_ln_v_by_alpha: f64,
+    /// The greatest of these over `1 + ln^2(theta v)` where slip is slow.
+    pub max_visible_by_alpha: f64,
     /// The integral that is the spare time if the path arrives.
     excess: f64,
     /// Slip `int v dt`.
@@ -303,11 +305,11 @@ impl FrictionPath {
         let (end_state, d) = (self.end_state(panel.side), panel.to);
         let by_friction = end_state.margin / self.a * d * (1.0 - d) * exp(self.exponent(end_state, d));
         (pass.w, pass.w_by_alpha) = (panel.w[NODES - 1], w_by_alpha);
-        let ln_v_by_alpha = by_friction + self.ratio * w_by_alpha;
-        // The relative change of a velocity of near nothing hardly counts.
+        let ln_v_by_alpha = (by_friction + self.ratio * w_by_alpha).abs();
+        // The rounding of a velocity of near nothing hardly counts.
         let ageing = self.ln_theta_v(panel.side, d, pass.w).min(0.0);
-        let change = ln_v_by_alpha.abs() / (1.0 + ageing * ageing);
-        pass.max_ln_v_by_alpha = pass.max_ln_v_by_alpha.max(change);
+        pass.max_ln_v_by_alpha = pass.max_ln_v_by_alpha.max(ln_v_by_alpha);
+        pass.max_visible_by_alpha = pass.max_visible_by_alpha.max(ln_v_by_alpha / (1.0 + ageing * ageing));
         pass.errors = 1.0 + growth * pass.errors;
         pass.max_errors = pass.max_errors.max((1.0 + self.ratio) * pass.errors);
         pass.slip += slip.0;
