@@ -144,11 +144,40 @@ fn middle(low: f64, high: f64) -> f64 {
     }
 }
 
+/// A zero of a continuous function between two points with values of opposite signs, to within `resolution`, by the Illinois method (Dowell and
+/// Jarratt, BIT 11, 168, 1971).
+pub fn crossing(
+    mut f: impl FnMut(f64) -> f64,
+    [mut x0, mut x1]: [f64; 2],
+    [mut f0, mut f1]: [f64; 2],
+    resolution: f64,
+) -> f64 {
+    for _ in 0..MAX_PROBES {
+        if f1 == 0.0 || (x1 - x0).abs() <= resolution {
+            return x1;
+        }
+        let x = x1 - f1 * (x1 - x0) / (f1 - f0);
+        let value = f(x);
+        if (value > 0.0) == (f1 > 0.0) {
+            f0 *= 0.5;
+        } else {
+            (x0, f0) = (x1, f1);
+        }
+        let step = (x - x1).abs();
+        (x1, f1) = (x, value);
+        if step <= resolution {
+            return x1;
+        }
+    }
+    x1
+}
+
 /// A zero of a continuous function between two points with values of opposite signs, to within `resolution`, by Chandrupatla's method (Advances in
 /// Engineering Software 28, 145, 1997): inverse quadratic interpolation where three points allow it, bisection elsewhere.
 ///
-/// It ends with a bracket of twice the resolution, or with a value of exactly 0.
-pub fn crossing(
+/// It takes some values more than [`crossing`], and is exact also where secants hardly move. It ends with a bracket of twice the resolution, or with a value of exactly 0. Without a change of sign it returns the end of lesser value; a value that is
+/// NaN counts as negative.
+pub fn bracketed_zero(
     mut f: impl FnMut(f64) -> f64,
     [mut far, mut near]: [f64; 2],
     [mut f_far, mut f_near]: [f64; 2],
@@ -159,10 +188,12 @@ pub fn crossing(
     for _ in 0..MAX_PROBES {
         let best = if f_near.abs() < f_far.abs() { near } else { far };
         let least = resolution / (far - near).abs();
-        if f_near == 0.0 || f_far == 0.0 || least.is_nan() || least > 0.5 {
+        let is_bracket = (f_near > 0.0) != (f_far > 0.0) && f_near != 0.0 && f_far != 0.0;
+        if !is_bracket || least.is_nan() || least > 0.5 {
             return best;
         }
-        let x = near + fraction.clamp(least, 1.0 - least) * (far - near);
+        let fraction_inside = if fraction.is_nan() { 0.5 } else { fraction.clamp(least, 1.0 - least) };
+        let x = near + fraction_inside * (far - near);
         let value = f(x);
         let (third, f_third) = if (value > 0.0) == (f_near > 0.0) { (near, f_near) } else { (far, f_far) };
         if (value > 0.0) != (f_near > 0.0) {

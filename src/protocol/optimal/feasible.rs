@@ -6,7 +6,7 @@ use super::extremal::Problem;
 use super::{ArcKind, Bounds, Obstacle, posed};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, ln};
-use crate::numerics::root::crossing;
+use crate::numerics::root::bracketed_zero;
 
 /// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
 /// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
@@ -135,7 +135,7 @@ fn root(
         low = (low.0 - step, room(low.0 - step));
         step *= 2.0;
     }
-    at(crossing(room, [low.0, high.0], [low.1, high.1], 0.1 * rtol)).0
+    at(bracketed_zero(room, [low.0, high.0], [low.1, high.1], 0.1 * rtol)).0
 }
 
 /// Least and greatest time whose logarithm is taken. Derived: doubles without overflow.

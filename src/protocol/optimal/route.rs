@@ -7,7 +7,7 @@ use super::motion::{Floor, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1};
 use crate::numerics::radau::radau;
-use crate::numerics::root::crossing;
+use crate::numerics::root::bracketed_zero;
 use crate::protocol::control::{Jet, SpringBlock, Tolerance, ValueRange};
 
 /// A place on the protocol.
@@ -270,7 +270,7 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
         let excess = f(d) - value;
         if excess.abs() <= 2.0 * f64::EPSILON * value { 0.0 } else { excess }
     };
-    crossing(excess, [0.0, most], [-value, excess(most)], 0.0).clamp(0.0, most)
+    bracketed_zero(excess, [0.0, most], [-value, excess(most)], 0.0).clamp(0.0, most)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::extremal::{Extremal, Problem};
 use super::guess::Guess;
 use super::{ArcKind, Optimum, Strategy, floor};
 use crate::numerics::elementary::{exp, ln_1p};
-use crate::numerics::root::{Probe, crossing, newton_in_pieces};
+use crate::numerics::root::{Probe, bracketed_zero, newton_in_pieces};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
@@ -373,7 +373,7 @@ pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
         match ends.map(|end| end < 0.0) {
             [true, true] => high,
             [false, false] => low,
-            _ => crossing(f, [low, high], ends, PLACE_RESOLUTION),
+            _ => bracketed_zero(f, [low, high], ends, PLACE_RESOLUTION),
         }
     };
     let turn = zero([0.0, 1.0], &|place| pieces.at(place).ln_u);

@@ -56,9 +56,6 @@ pub const SETTLED: f64 = 0.01;
 /// Band of settled velocities: `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
 pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 
-/// Resolution of a place within a step, as a fraction of it. Chosen: ten roundings of a double.
-const PLACE_ROUNDING: f64 = 1e-15;
-
 /// Half widths of the windows of both refinements of an extremum, fractions of a step. Chosen: the error of the dense
 /// output, of order 5, is smaller at every tolerance.
 const POLISH_WINDOW: [f64; 2] = [0.125, 0.125];
@@ -180,7 +177,7 @@ impl<'a> Orbit<'a> {
         for u1 in radau_iia_9().nodes {
             let (x1, slope1) = (step.value(X, u1), step.slope(X, u1));
             if slope0 * slope1 < 0.0 {
-                let turn = crossing(|u| step.slope(X, u), [u0, u1], [slope0, slope1], PLACE_ROUNDING);
+                let turn = crossing(|u| step.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
                 let x = step.value(X, turn);
                 self.scan_monotone(step, [u0, turn], [x0, x]);
                 let rough = Extremum { x, t: step.time(turn) };
@@ -206,7 +203,7 @@ impl<'a> Orbit<'a> {
 
     /// Finds crossings within a range of a step in which the velocity is monotone.
     fn scan_monotone(&mut self, step: &IntegrationStep, u: [f64; 2], x: [f64; 2]) {
-        let at = |level: f64| crossing(|u| step.value(X, u) - level, u, [x[0] - level, x[1] - level], PLACE_ROUNDING);
+        let at = |level: f64| crossing(|u| step.value(X, u) - level, u, [x[0] - level, x[1] - level], 1e-9);
         let (rises, falls) = (x[0] < 0.0 && x[1] >= 0.0, x[0] > 0.0 && x[1] <= 0.0);
         if rises {
             let cycle = self.end_cycle(step, at(0.0));
@@ -260,7 +257,7 @@ impl<'a> Orbit<'a> {
             if slopes[0] * slopes[1] >= 0.0 {
                 break;
             }
-            (step, u) = (refined_step, crossing(|u| refined_step.slope(X, u), [0.0, 1.0], slopes, PLACE_ROUNDING));
+            (step, u) = (refined_step, crossing(|u| refined_step.slope(X, u), [0.0, 1.0], slopes, 1e-9));
         }
         substep(&mut self.run, &step, 0.0, u)
             .map_or(rough, |refined_step| Extremum { x: refined_step.end()[X], t: refined_step.time(1.0) })
