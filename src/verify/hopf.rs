@@ -93,7 +93,7 @@ impl Point {
             return None;
         }
         let omega = ((b - a) / a).sqrt();
-        // Without mass the balance of forces gives x, and a third variable lives apart from the others.
+        // Without mass the balance of forces gives x, and a third variable is apart from the others.
         let is_massless = mass == 0.0;
         let force = |u: &Vector| u[0] - u[1] * b;
         let x = |u: &Vector| if is_massless { force(u) / a } else { u[2] };

@@ -211,9 +211,9 @@ impl Both {
             self.undecided_judges, self.largest_agreed
         );
         for (name, totals) in [("0.1.0", &self.before), ("now", &self.after)] {
-            let shares: Vec<String> =
+            let outcomes: Vec<String> =
                 OUTCOMES.iter().zip(totals.outcomes).map(|(name, n)| format!("{n} {name}")).collect();
-            println!("{name}: {}, {:.2} ms of a core each", shares.join(", "), 1e3 * totals.seconds / count as f64);
+            println!("{name}: {}, {:.2} ms of a core each", outcomes.join(", "), 1e3 * totals.seconds / count as f64);
             println!(
                 "  {} outcomes wrong, {} points off by more than 2 rtol; largest errors:",
                 totals.otherwise, totals.off
