@@ -1,7 +1,5 @@
 //! All real roots of a polynomial on an interval, each bracketed between roots of its derivative.
 
-use super::root::{Probe, newton};
-
 /// The value of `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope.
 pub fn value_and_slope(c: &[f64], x: f64) -> (f64, f64) {
     c.iter().rev().fold((0.0, 0.0), |(value, slope), &c| (value * x + c, slope * x + value))
@@ -19,13 +17,29 @@ pub fn roots_between(c: &[f64], low: f64, high: f64) -> Vec<f64> {
     ends.windows(2).filter_map(|piece| root_of_monotone(c, piece[0], piece[1])).collect()
 }
 
-fn root_of_monotone(c: &[f64], low: f64, high: f64) -> Option<f64> {
+/// Newton's method inside a bracket. A step that leaves the bracket is replaced by a bisection.
+fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
     let (first, last) = (value_and_slope(c, low).0, value_and_slope(c, high).0);
-    let sign = if first < 0.0 { 1.0 } else { -1.0 };
-    let probe = |x: f64| {
+    if !((first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0)) {
+        return None;
+    }
+    let mut x = 0.5 * (low + high);
+    for _ in 0..MAX_STEPS {
         let (value, slope) = value_and_slope(c, x);
-        Some(Probe { value: sign * value, slope: sign * slope })
-    };
-    let changes = (first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0);
-    newton(probe, 0.5 * (low + high), (low, high), false, 0.0).filter(|_| changes).map(|root| root.x)
+        if (value < 0.0) == (first < 0.0) {
+            low = x;
+        } else {
+            high = x;
+        }
+        let newton = x - value / slope;
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - x).abs() <= f64::EPSILON * x.abs() {
+            return Some(next);
+        }
+        x = next;
+    }
+    Some(x)
 }
+
+/// Greatest number of steps. Chosen: more than bisection from 1 down to 1e-16 and some Newton steps need.
+const MAX_STEPS: u32 = 100;

@@ -12,7 +12,6 @@ use super::extremal::{Extremal, FreeSums, Problem};
 use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
-use crate::numerics::root::{Probe, newton};
 
 /// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.
 #[derive(Debug, Clone, Copy)]
@@ -86,23 +85,60 @@ impl Fall {
         ]
     }
 
-    /// The zero of a monotone `G` between two depths, at the first of which it is negative or not; `known` is one nearby, if it
-    /// is between them.
-    fn zero(&self, kind: ArcKind, [from, to]: [f64; 2], starts_negative: bool, known: f64) -> f64 {
-        let sign = if starts_negative { 1.0 } else { -1.0 };
-        // phi may be an exponential that is far from its zero: its logarithm is not. For E < 0 G is positive.
-        let probe = |d: f64| {
-            let [(phi, phi_slope), (energy, energy_slope)] = self.parts(kind, d);
-            let slope = phi_slope / phi - energy_slope / energy;
-            (energy > 0.0).then(|| Probe { value: sign * ln(phi / energy), slope: sign * slope })
+    /// Whether a ceiling binds anywhere.
+    pub fn is_bound(&self, ceilings: &Ceilings) -> bool {
+        let below = |kind, [from, to]: [f64; 2]| from < to && (self.gap(kind, from) < 0.0 || self.gap(kind, to) < 0.0);
+        self.intervals(ceilings).into_iter().any(|(kind, interval)| below(kind, interval))
+    }
+
+    /// The zero of a monotone `G` between two depths at which it is of different signs; `known` is one nearby, if it is
+    /// between them.
+    fn zero(&self, kind: ArcKind, [mut from, mut to]: [f64; 2], [start, end]: [f64; 2], known: f64) -> f64 {
+        let Law { a, b } = self.law;
+        let rise = if kind == ArcKind::VCeiling { 1.0 } else { self.kappa };
+        let mut d = if known > from && known < to {
+            known
+        } else if start.abs() < end.abs() {
+            from
+        } else {
+            to
         };
-        let start = if known > from && known < to { known } else { 0.5 * (from + to) };
-        newton(probe, start, (from, to), starts_negative, ROUNDING).map_or(from, |root| root.x)
+        for _ in 0..MAX_STEPS {
+            let [(phi, phi_slope), (energy, energy_slope)] = self.parts(kind, d);
+            let (value, slope) = (phi - energy, phi_slope - energy_slope);
+            if (value < 0.0) == (start < 0.0) {
+                from = d
+            } else {
+                to = d
+            }
+            // phi may be an exponential that is far from its zero.
+            let newton = if phi > 2.0 * energy && energy > 0.0 {
+                ln(phi / energy) / (phi_slope / phi - energy_slope / energy)
+            } else {
+                value / slope
+            };
+            // Halley's method, of whose error that of third order is left.
+            let bend = 0.5 * (rise * (a * rise - phi_slope) + energy_slope + b - a) / slope;
+            let correction = if phi > 2.0 * energy { f64::INFINITY } else { (bend * newton).abs() };
+            let step = if correction < 0.3 { newton / (1.0 - bend * newton) } else { newton };
+            let next = d - step;
+            // The third derivative is that of phi, whose rate cancels where both terms fall alike.
+            let third = rise.abs().max(1.0) * rise.abs().max(1.0) * (phi_slope / slope).abs();
+            let left = (correction * correction + third * newton * newton) * step.abs();
+            if left <= ROUNDING * d || step.abs() <= ROUNDING * d {
+                return next.max(from).min(to);
+            }
+            d = if next > from && next < to { next } else { 0.5 * (from + to) };
+        }
+        d
     }
 }
 
-/// Rounding error of the logarithm of a ratio. Chosen: that of a few operations.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Greatest number of steps. Chosen: more than bisection of a double takes, 64.
+const MAX_STEPS: u32 = 100;
+
+/// Relative rounding error of a depth. Derived: that of one operation.
+const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
 /// Depths of the switches of the last path of a search, from which the next search for them starts: the first and the second
 /// of friction, and that of the velocity; NaN before.
@@ -281,7 +317,7 @@ impl Path {
             let ends = [fall.gap(ceiling, first), fall.gap(ceiling, last)];
             let mut switch = last;
             if (ends[0] < 0.0) != (ends[1] < 0.0) {
-                switch = fall.zero(ceiling, [first, last], ends[0] < 0.0, known.get());
+                switch = fall.zero(ceiling, [first, last], ends, known.get());
                 known.set(switch);
             }
             for (at, to, value, sign) in [(first, switch, ends[0], ends[0]), (switch, last, 0.0, ends[1])] {

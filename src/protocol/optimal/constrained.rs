@@ -3,9 +3,9 @@
 
 use super::arc::phi;
 use super::ceiling::Ceilings;
-use super::clamp::{Path, PathSums, Switch, Switches};
-use super::extremal::{Extremal, MAX_LN_U, Problem};
-use super::guess::Guess;
+use super::clamp::{Path, PathSums, Switch, Switches, falling_part};
+use super::extremal::{Extremal, Problem};
+use super::guess::{Guess, QUADRATURE_ERROR, capped_guess};
 use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum, floor};
@@ -113,6 +113,12 @@ impl Constrained {
 pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64) -> Constrained {
     let guess = Guess::of(problem, time.beyond);
     let none = ceilings.v == f64::INFINITY && ceilings.tau == f64::INFINITY;
+    if !none
+        && time.beyond > 0.0
+        && let Some(found) = find_bound(problem, ceilings, time, rtol, &guess)
+    {
+        return found;
+    }
     let (free, member) = search::free(problem, time, rtol, &guess);
     let Solved { status, value, stats } = free;
     // The velocity rises where friction exceeds b - a. A proven extremal may have less only where theta rises: where theta falls,
@@ -142,6 +148,41 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
         _ => Constrained::without_numbers(Status::Infeasible, stats),
     }
 }
+
+/// The optimum where a ceiling certainly binds, without the free one; `None` where that is not known from the first parameter.
+fn find_bound(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64, guess: &Guess) -> Option<Constrained> {
+    let &Guess { q_floor, p, error } = guess;
+    let (t_f, depth, origin) = (time.whole, ln_1p(problem.fall), q_floor.unwrap_or(0.0));
+    // Friction is so high all along every path that the free optimum is proven: where v >= 1, or where u > 1.
+    let at_floor = 1.0 + problem.law.b * problem.from.ln.min(problem.to.ln);
+    let at_once = problem.fall > 0.0 && p + origin > 0.0;
+    let proven = problem.bounded && at_floor > problem.unique_above() || at_once && !problem.is_doubtful();
+    if !proven || ceilings.cap(0.0).min(ceilings.cap(depth)) <= 0.0 {
+        return None;
+    }
+    let fall = falling_part(problem, ceilings, &problem.extremal(p, q_floor)?)?;
+    if !fall.is_bound(ceilings) {
+        return None;
+    }
+    let Feasible::Times(least, most) = feasible(problem, ceilings) else { return None };
+    if t_f < least || t_f > most {
+        return None;
+    }
+    let mut start = Guess { p, q_floor, error: UNKNOWN_TIME_ERROR };
+    if at_once && error <= QUADRATURE_ERROR {
+        let z = [p + origin, all_on_ceilings(problem, ceilings)];
+        if let Some(z_0) = capped_guess(problem, ceilings, [t_f, least], z) {
+            start = Guess { p: z_0 - origin, q_floor, error: CAPPED_ERROR };
+        }
+    }
+    let search = Search { problem, ceilings, t_f, least, most, rtol, stats: SolverStats::default() };
+    let found = search.solve(start);
+    let binds = found.solved.value.is_some_and(|found| found.time_at_v_ceiling + found.time_at_tau_ceiling > 0.0);
+    binds.then_some(found)
+}
+
+/// Usual error of a first parameter under ceilings. Measured: it decides only the tolerance of the first quadrature (`cargo bench --bench optimal`).
+const CAPPED_ERROR: f64 = 1e-2;
 
 /// The optimum of the time of the turn, then steady sliding.
 fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stats: SolverStats) -> Constrained {
@@ -392,7 +433,7 @@ fn all_on_ceilings(problem: &Problem, ceilings: &Ceilings) -> f64 {
             z_0 = turning((2.0 * most / a).sqrt()).ln_u;
         }
     }
-    if z_0.is_finite() { z_0 } else { MAX_LN_U }
+    if z_0.is_finite() { z_0 } else { MOST_LN_U }
 }
 
 /// The lifetime of this logarithm.
@@ -418,3 +459,6 @@ const LIMIT_RTOL: f64 = 16.0 * f64::EPSILON;
 
 /// Widens a bracket beyond its rounding. Chosen: far above the rounding, far below a step of the search.
 const MARGIN: f64 = 1e-6;
+
+/// Largest `ln u` that is searched. Derived: beyond, `e^(ln u)` comes near overflow, at 709.
+const MOST_LN_U: f64 = 690.0;

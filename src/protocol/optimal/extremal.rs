@@ -36,7 +36,7 @@ pub(super) struct Problem {
 }
 
 /// Largest `ln u` that is searched: protocols of `1e-300` in units of `l/v_0`. Derived: beyond, `e^(ln u)` comes near overflow, at 709.
-pub(super) const MAX_LN_U: f64 = 690.0;
+const MAX_LN_U: f64 = 690.0;
 
 /// One member of the family.
 #[derive(Debug, Clone, Copy)]

@@ -5,7 +5,6 @@ use crate::model::Law;
 use crate::numerics::dilogarithm::dilogarithm;
 use crate::numerics::elementary::{exp_m1, ln_1p};
 use crate::numerics::gauss::rule;
-use crate::numerics::root::{Probe, newton};
 
 /// Time to age by `growth`, until `rest` is left to 1.
 pub(super) fn time(growth: f64, rest: f64) -> f64 {
@@ -55,11 +54,19 @@ pub(super) fn leave(law: &Law, ln_theta_r: f64, kappa: f64) -> Option<f64> {
     if slope <= 0.0 {
         return None;
     }
-    let probe = |d: f64| {
+    let mut d = ln_1p(kappa / slope);
+    for _ in 0..100 {
         let m = exp_m1(d);
         let derivative = slope * (1.0 + m) - law.b;
-        (derivative > 0.0).then_some(Probe { value: slope * m - law.b * d - kappa, slope: derivative })
-    };
-    let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
-    newton(probe, ln_1p(kappa / slope), everywhere, false, f64::EPSILON * kappa.abs()).map(|root| root.x)
+        if derivative.is_nan() || derivative <= 0.0 {
+            return None;
+        }
+        let step = (slope * m - law.b * d - kappa) / derivative;
+        d -= step;
+        if step.abs() <= 1e-15 * d.abs() {
+            return Some(d);
+        }
+    }
+    // Rounding keeps the last steps at an ulp or two.
+    d.is_finite().then_some(d)
 }

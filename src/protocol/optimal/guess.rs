@@ -3,9 +3,10 @@
 use multiversion::multiversion;
 
 use super::arc::phi;
+use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
-use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};
@@ -29,7 +30,7 @@ impl Guess {
         let z_0 = p + q_floor.unwrap_or(0.0);
         if problem.fall > 0.0
             && z_0 > 0.0
-            && let Some(z_0) = Falling::of(problem).start(&between(z_0), beyond)
+            && let Some(z_0) = Falling::of(problem).start(&between(z_0), [beyond, 0.0], &[f64::INFINITY; LANES])
         {
             return Guess { q_floor, p: z_0 - q_floor.unwrap_or(0.0), error: QUADRATURE_ERROR };
         }
@@ -40,11 +41,41 @@ impl Guess {
 /// Fraction of `q_floor` below which parameters are counted from 0. Chosen: counted from `q_floor`, a search would lose five digits of them.
 const MIN_REACH: f64 = 1e-5;
 
+/// A first parameter for the time `t_f` under ceilings, where theta falls at once and the ceilings bind: between that of the free
+/// arc and that of the arc that is on a ceiling throughout, which takes the time `least`.
+pub(super) fn capped_guess(
+    problem: &Problem,
+    ceilings: &Ceilings,
+    times: [f64; 2],
+    [free, most]: [f64; 2],
+) -> Option<f64> {
+    let arcs = Falling::of(problem);
+    let mut z = [0.0; LANES];
+    for (i, z) in z.iter_mut().enumerate() {
+        let left = 1.0 - i as f64 / LANES as f64;
+        *z = most - (most - free) * (left * left);
+    }
+    arcs.start(&z, times, &ceilings_at(ceilings, &arcs, rule(CAPPED_NODES).x.first_chunk()?))
+}
+
+/// `u - 1` at the ceilings at the nodes.
+fn ceilings_at(ceilings: &Ceilings, arcs: &Falling, x: &[f64; CAPPED_NODES]) -> [f64; CAPPED_NODES] {
+    let mut caps = [0.0; CAPPED_NODES];
+    for (cap, x) in caps.iter_mut().zip(x) {
+        let s = 0.5 * (1.0 + x);
+        *cap = exp_m1(ceilings.cap(arcs.depth * (1.0 - s * s * s)).min(MOST));
+    }
+    caps
+}
+
+/// Nodes under ceilings: an arc has a kink where one begins. Chosen: two vectors of lanes.
+const CAPPED_NODES: usize = 2 * LANES;
+
 /// Usual error of the line. Measured: it decides only the tolerance of the first quadrature (`cargo bench --bench optimal`).
 const LINE_ERROR: f64 = 0.1;
 
 /// Usual error of the coarse quadrature. Measured, as [`LINE_ERROR`].
-const QUADRATURE_ERROR: f64 = 1e-4;
+pub(super) const QUADRATURE_ERROR: f64 = 1e-4;
 
 fn line(problem: &Problem, q_floor: Option<f64>, beyond: f64) -> f64 {
     let law = problem.law;
@@ -118,11 +149,12 @@ impl Falling {
         Falling { law: problem.law, theta_0: problem.from.theta, depth, friction: problem.friction_a() }
     }
 
-    /// `ln u(0+)` for a `time`, by interpolation between these eight; `None` where it is not among them.
-    fn start(&self, z: &Lanes, time: f64) -> Option<f64> {
-        let rule = rule(LANES);
-        let times = ln_times(self, z, rule.x.first_chunk()?, rule.w.first_chunk()?);
-        let wanted = ln(time);
+    /// `ln u(0+)` for a `time`, by interpolation between these eight; `None` where it is not among them. `u - 1` is at most
+    /// `caps` at the nodes, which takes the time `least` where it is that all along.
+    fn start<const N: usize>(&self, z: &Lanes, [time, least]: [f64; 2], caps: &[f64; N]) -> Option<f64> {
+        let rule = rule(N);
+        let times = ln_times(self, z, rule.x.first_chunk()?, rule.w.first_chunk()?, caps);
+        let wanted = ln(time - least);
         // Times fall; four of them about the one wanted.
         let after = times.iter().position(|&time| time < wanted).filter(|&after| after > 0)?;
         let from = after.saturating_sub(2).min(LANES - 4);
@@ -139,16 +171,17 @@ impl Falling {
     }
 }
 
-/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MOST`] where there is no arc.
+/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MOST`] where there is no arc. Under
+/// ceilings, of the times beyond that on the ceilings.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn ln_times(arcs: &Falling, z: &Lanes, x: &Lanes, w: &Lanes) -> Lanes {
+fn ln_times<const N: usize>(arcs: &Falling, z: &Lanes, x: &[f64; N], w: &[f64; N], caps: &[f64; N]) -> Lanes {
     let Law { a, b } = arcs.law;
     let per_a = 1.0 / a;
-    let (mut grow, mut bend, mut weight) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
+    let (mut grow, mut bend, mut weight, mut least) = ([0.0; N], [0.0; N], [0.0; N], 0.0);
+    for i in 0..N {
         // y = ln(theta/theta_0) = -depth s^3 opens the start, where u changes fast.
         let s = 0.5 * (1.0 + x[i]);
         let y = -arcs.depth * (s * s * s);
@@ -156,21 +189,25 @@ fn ln_times(arcs: &Falling, z: &Lanes, x: &Lanes, w: &Lanes) -> Lanes {
         bend[i] = ((b - a) * y - arcs.friction * (grow[i] - 1.0)) * per_a;
         weight[i] = 1.5 * arcs.theta_0 * arcs.depth * w[i] * (s * s) * grow[i];
     }
+    for i in 0..N {
+        least += weight[i] / (caps[i] + f64::MIN_POSITIVE);
+    }
     let (mut phi, mut time, mut ln_time) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     for i in 0..LANES {
         phi[i] = exp(z[i]) - 1.0 - z[i];
     }
     // E = phi(z_0) grow + bend.
-    for node in 0..LANES {
+    for node in 0..N {
         for i in 0..LANES {
             let e = phi[i] * grow[node] + bend[node];
             let e = if e > 0.0 { e } else { 0.0 };
             let excess = rough_excess((2.0 * e).sqrt(), e);
+            let excess = if excess < caps[node] { excess } else { caps[node] };
             time[i] += weight[node] / (excess + f64::MIN_POSITIVE);
         }
     }
     for i in 0..LANES {
-        ln_time[i] = ln(time[i]);
+        ln_time[i] = ln(time[i] - least);
     }
     ln_time
 }

@@ -5,9 +5,8 @@ use super::extremal::{Extremal, Problem};
 use super::floor;
 use super::motion::{Floor, Timed};
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1};
+use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
-use crate::numerics::root::bracketed_zero;
 use crate::protocol::control::{Jet, SpringBlock, Tolerance, ValueRange};
 
 /// A place on the protocol.
@@ -264,14 +263,37 @@ pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
 /// Most landmarks of a floor arc. Chosen: beyond, `e^-100`, nothing changes any more.
 const MAX_MARKS: usize = 100;
 
-/// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value, to the rounding of the value.
+/// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value: bracketed secants of its logarithm.
 fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let excess = |d: f64| {
-        let excess = f(d) - value;
-        if excess.abs() <= 2.0 * f64::EPSILON * value { 0.0 } else { excess }
-    };
-    bracketed_zero(excess, [0.0, most], [-value, excess(most)], 0.0).clamp(0.0, most)
+    let (mut low, mut high) = (0.0, most);
+    let mut last = (most, f(most));
+    let mut d = most * (value / last.1).clamp(0.0, 1.0);
+    for _ in 0..MAX_STEPS {
+        if d <= low || d >= high {
+            d = 0.5 * (low + high);
+        }
+        let found = f(d);
+        let order = ln(last.1 / found) / ln(last.0 / d);
+        last = (d, found);
+        if found < value {
+            low = d;
+        } else {
+            high = d;
+        }
+        d *= exp(ln(value / found) / order);
+        // The last step leaves less than the square of what it started from; the rounding of places leaves more.
+        if (found / value - 1.0).abs() <= LAST_STEP_RTOL {
+            break;
+        }
+    }
+    d.clamp(0.0, most)
 }
+
+/// A relative difference after which one more step is enough. Derived: a step squares it.
+const LAST_STEP_RTOL: f64 = 1e-8;
+
+/// Most steps. Chosen: more than bisection needs.
+const MAX_STEPS: u32 = 60;
 
 #[cfg(test)]
 mod tests {

@@ -7,7 +7,7 @@ use super::extremal::{Extremal, Problem};
 use super::guess::Guess;
 use super::{ArcKind, Optimum, Strategy, floor};
 use crate::numerics::elementary::{exp, ln_1p};
-use crate::numerics::root::{Probe, bracketed_zero, newton_in_pieces};
+use crate::numerics::root::{Probe, newton_in_pieces};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
@@ -368,24 +368,26 @@ pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
         let here = pieces.at(place);
         (1.0 + law.a * here.ln_u + (law.b - law.a) * (here.ln_theta - 1.0), here.ln_u - here.ln_theta)
     };
-    let zero = |[low, high]: [f64; 2], f: &dyn Fn(f64) -> f64| {
-        let ends = [f(low), f(high)];
-        match ends.map(|end| end < 0.0) {
-            [true, true] => high,
-            [false, false] => low,
-            _ => bracketed_zero(f, [low, high], ends, PLACE_RESOLUTION),
+    let bisect = |[mut low, mut high]: [f64; 2], is_low: &dyn Fn(f64) -> bool| {
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if is_low(middle) { low = middle } else { high = middle }
         }
+        low
     };
-    let turn = zero([0.0, 1.0], &|place| pieces.at(place).ln_u);
-    let flat = [[0.0, turn], [turn, 1.0]].map(|leg| look(zero(leg, &|place| look(place).0)).1);
+    let turn = bisect([0.0, 1.0], &|place| pieces.at(place).ln_u < 0.0);
+    let flat = [[0.0, turn], [turn, 1.0]].map(|leg| {
+        let sign = look(leg[0]).0 < 0.0;
+        look(bisect(leg, &|place| (look(place).0 < 0.0) == sign)).1
+    });
     let ln_v = [look(0.0).1, look(1.0).1, flat[0], flat[1]];
     [f64::INFINITY, f64::NEG_INFINITY]
         .map(|from| ln_v.iter().fold(from, |range, &v| if from > 0.0 { range.min(v) } else { range.max(v) }))
         .map(exp)
 }
 
-/// Resolution of a place where the velocity is flat. Derived: half of the digits of a place are enough.
-const PLACE_RESOLUTION: f64 = 1e-9;
+/// Halvings that find a place where the velocity is flat. Derived: half of the digits of a place are enough.
+const HALVINGS: u32 = 36;
 
 /// The extremals of a problem; the parameter counts from `q_floor`.
 struct Extremals<'a> {
