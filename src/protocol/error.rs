@@ -77,7 +77,7 @@ pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mu
     let (exponent, delay) = if family.uses_tau_ceiling() {
         // Without a ceiling tau itself is rounded.
         let tau = if case.tau_ceiling.is_finite() { case.tau_ceiling } else { member.friction_max };
-        (0.02 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (tau.abs() + b) / a, 1.5 * ROUNDING)
+        (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (tau.abs() + b) / a, 1.5 * ROUNDING)
     } else {
         (0.0, 0.5 * ROUNDING)
     };

@@ -362,6 +362,46 @@ const STANDSTILLS: &[(f64, f64, f64, f64, f64, f64)] = &[
     (5.534197383053905e-6, 6.611110694825728, 277973.1354571624, 9557.49549032812, 0.000101088695484269, f64::INFINITY),
 ];
 
+/// Points of the whole legal domain that were `not_converged` at 1e-12 alone: `alpha_3` is near `-ln R`, so that steady
+/// sliding at the start is left only just, and `b/a` of 1e6 magnifies the rounding of the friction that is left of both.
+#[rustfmt::skip]
+const LEFT_ONLY_JUST: &[(f64, f64, f64, f64, f64, f64)] = &[
+    (2.946846505263005e-6, 4.161123553335814, 46908246640.89516, 1.000000000004479, 26.13160260590015, 1.0000000000273217),
+    (1.610429801407463e-6, 3.717129931444194, 70452.31716411033, 1.0000000000002145, 2.6230196599313045, 0.9999999999992039),
+    (1.372473872407973e-6, 1.348811217683763, 3630371611.826745, 1.0000000000092228, 25.40933761858282, 0.9999999999875603),
+];
+
+/// Points with the accuracy at which works or velocities were off by more than that: changes of velocity within a layer too
+/// thin to change theta; a protocol of no velocity at all in the place of an acceleration.
+#[rustfmt::skip]
+const OFF_AT_ONE_ACCURACY: &[([f64; 6], f64)] = &[
+    ([1.1180227087666295e-5, 2.25683691049984, 1.000001161955397, 30.744548440737248, 697752.5196888542, 40553.360235469154], 1e-9),
+    ([1.1180227087666295e-5, 2.25683691049984, 1.000001161955397, 30.744548440737248, 697752.5196888542, 40553.360235469154], 1.1212059240887716e-11),
+    ([2.500657931511109e-6, 6.686515605788409, 88070.9685524763, 1.0000144815980871, 11.14263493891144, 1.0058344272204451], 9.285634700577529e-11),
+    ([0.4867812489120679, 0.39073539054655687, 2.4182984472397457, 42928643072.775505, 0.0871398077931722, 3.3514720320605376], 3.3728616869066194e-10),
+    ([0.383871713803012, 0.28588415751237367, 1.0000000000004179, 17337165312.864532, 0.21934224372281394, 5.177720461883859], 1.0073459987466845e-12),
+];
+
+#[test]
+fn regress_steady_sliding_that_is_left_only_just_is_solved_at_every_accuracy() {
+    solved_alike_at_every_accuracy(LEFT_ONLY_JUST);
+}
+
+#[test]
+fn regress_extremes_of_the_velocity_are_good_to_rtol_where_theta_does_not_show_them() {
+    for &([a, b, v_i, v_f, t_f, tau_ceiling], rtol) in OFF_AT_ONE_ACCURACY {
+        let case = case(Law { a, b }, v_i, v_f, t_f, tau_ceiling);
+        let [rough, fine] = [rtol, 1e-13].map(|rtol| solve(&case, rtol).unwrap_or_else(|o| panic!("{case:?}: {o}")));
+        let logarithms = fine.v_max.ln() + v_i.max(v_f).ln();
+        let allowed = (2.0 * rtol + 2e-13) * (1.0 + (a + b) * logarithms);
+        assert!(relative(rough.work, fine.work) <= allowed, "{rtol}: {rough:?} {fine:?} in {case:?}");
+        // A velocity carries the rounding of `ln theta` `b/a` times.
+        let allowed = allowed + 2.0 * f64::EPSILON * b / a * logarithms;
+        assert!(relative(rough.v_min, fine.v_min) <= allowed, "{rtol}: {rough:?} {fine:?} in {case:?}");
+        assert!(relative(rough.v_max, fine.v_max) <= allowed, "{rtol}: {rough:?} {fine:?} in {case:?}");
+    }
+}
+
 /// `b` near `a`: forwards errors grow, which the rough search need not show; the other way they do not.
 #[test]
 fn regress_the_way_with_less_rounding_is_taken() {
@@ -410,7 +450,7 @@ fn solved_alike_at_every_accuracy(points: &[(f64, f64, f64, f64, f64, f64)]) {
             assert!(relative(rough.v_max, fine.v_max) <= allowed, "{rtol}: {rough:?} {fine:?} in {case:?}");
         }
     }
-    assert!(3 * compared >= points.len(), "{compared} of {}", 3 * points.len());
+    assert!(3 * compared > 8 * points.len(), "{compared} of {}", 3 * points.len());
 }
 
 /// A fast block that slides steadily for 18 % of the time and then stands still: `alpha_3` that made slips add up to the

@@ -2,12 +2,21 @@
 
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
+use crate::numerics::elementary::ln;
 
 /// `ln 2` less its nearest double.
 const LN_2_REST: f64 = 2.3190468138462996e-17;
 
+/// Margin, fraction of its terms, below which it is formed in double-double. Chosen: one digit is lost there.
+const CANCELLATION: f64 = 0.1;
+
 /// Margin of steady sliding at `v >= 1`, in `mu_0 sigma`.
 pub(super) fn friction_margin(law: Law, tau_ceiling: f64, v: f64) -> f64 {
+    let scale = tau_ceiling - 1.0;
+    let plain = scale - (law.a - law.b) * ln(v);
+    if plain.abs() > CANCELLATION * scale.abs().max(1.0) {
+        return plain;
+    }
     let slope = DoubleDouble::sum(law.a, -law.b);
     (DoubleDouble::sum(tau_ceiling, -1.0) - slope * logarithm(v)).high
 }

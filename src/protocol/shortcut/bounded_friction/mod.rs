@@ -10,18 +10,18 @@
 //! x)`. This is the member for an infinite `tau_M`, that is, without bound.
 //!
 //! `d(theta')/d(theta) = (b/a - 1) v`: theta is integrated forwards for `b <= a` and backwards for `b > a`, as both
-//! contract. The other direction is tried where that has much rounding: theta loses digits where it falls over decades.
-//!
-//! The residual is theta at the end. Where the time is just long enough, that hardly depends on `alpha_3`. Then the
-//! residual is the spare time. Beyond the time of `v = 0` it equals the slip `int theta v dt`. Beyond the time of
-//! `tau = tau_M` it equals, with `z_M = ln(theta v)` for friction `tau_M`,
+//! contract. Where the time is just long enough, theta at the end hardly depends on `alpha_3`. Then the equation is for
+//! the spare time. Beyond the time of `v = 0` it equals the slip `int theta v dt`. Beyond the time of `tau = tau_M` it
+//! equals, with `z_M = ln(theta v)` for friction `tau_M`,
 //!
 //! ```text
 //! int [1 - e^(-(tau_M - tau)/a)]/[1 - e^(-z_M)] dt.
 //! ```
 //!
-//! Both are sums of positive terms and fall like `1/|alpha_3|`. Where `z_M` is below its values at both ends, it counts
-//! as the lesser of them. This keeps the integral positive and a function of theta at the end.
+//! Both are sums of positive terms and fall like `1/|alpha_3|`.
+//!
+//! In a standstill, theta does not depend on either end. There both ends are integrated to a point in the standstill,
+//! and the slip of both is compared with the spare time.
 
 mod friction_margin;
 mod motion;
@@ -29,17 +29,16 @@ mod panel;
 mod path;
 mod work_and_velocity;
 
-use std::cmp::Ordering;
-
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::Transition;
-use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Motion, SolverStats};
 use friction_margin::friction_margin;
 use motion::BoundedFrictionMotion;
-use path::{FrictionPath, Pass};
+use panel::FrictionPanel;
+use path::{FrictionPath, PassFailure, PassResult, Residual, WorkTolerance};
 use work_and_velocity::WorkAndVelocity;
 
 /// The family `bounded_friction`.
@@ -63,34 +62,55 @@ impl Family for BoundedFriction {
     }
 
     fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
-        let Member { path, pass, .. } = member(case, rtol, stats)?;
-        let WorkAndVelocity { work, v_min, v_max } = WorkAndVelocity::of(&case.transition, &path, &pass.panels);
-        if !work.is_finite() {
+        let (path, panels) = member(case, rtol, stats)?;
+        let totals = match case.transition {
+            Transition { v_i, v_f, .. } if v_i == v_f => WorkAndVelocity::steady(&path, v_i),
+            transition => WorkAndVelocity::of(&transition, &path, &panels),
+        };
+        if !totals.work.is_finite() {
             return Err(Obstacle::NotConverged);
         }
-        let (friction_min, friction_max) = path.friction_range();
         Ok(Shortcut {
             alpha: Some(if case.tau_ceiling == f64::INFINITY { 0.0 } else { path.alpha }),
-            work,
-            v_min,
-            v_max,
-            friction_max: friction_max.min(case.tau_ceiling),
-            friction_min,
+            work: totals.work,
+            v_min: totals.v_min,
+            v_max: totals.v_max,
+            friction_max: path.friction_max().min(case.tau_ceiling),
+            friction_min: path.friction_min(),
             miss: 0.0,
         })
     }
 
     fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
-        let Member { path, pass: Pass { mut panels, .. }, .. } = member(case, rtol, &mut SolverStats::default())?;
-        if !path.forward {
-            panels.reverse();
-        }
+        let (path, panels) = member(case, rtol, &mut SolverStats::default())?;
+        // Panels of backward integration come after those of forward integration, in reverse order.
+        let (mut panels, backward): (Vec<FrictionPanel>, Vec<FrictionPanel>) =
+            panels.into_iter().partition(|panel| panel.forward);
+        panels.extend(backward.into_iter().rev());
         Ok(Box::new(BoundedFrictionMotion { path, panels }))
     }
 }
 
 /// Margin without a bound, in `mu_0 sigma`: stands for infinity. Chosen: far above every friction, and its square is a double.
 const UNBOUNDED_MARGIN: f64 = 1e100;
+
+/// Spare time, fraction of [`FrictionPath::time_per_w`], below which it is the residual. Chosen; the budgets of `shortcut` judge it.
+const SPARE_TIME_FRACTION: f64 = 0.1;
+
+/// Duration of a standstill, fraction of `t_f`, above which the residual is two-sided. Chosen; the budgets of `shortcut` judge it.
+const STANDSTILL_FRACTION: f64 = 0.1;
+
+/// Logarithm of the ratio of the velocities above which they count as far apart, and `b/a` times it. Chosen; the budgets of `shortcut` judge it.
+const MIN_LN_RATIO: f64 = 7.0;
+const MIN_LN_THETA_RATIO: f64 = 1e3;
+
+/// Growth of errors above which another residual is tried. Chosen; the budgets of `shortcut` judge it.
+const MAX_ERROR_GROWTH: f64 = 1e3;
+
+/// Relative rounding of theta at which a pass fails, if the requested tolerance is tighter: while other residuals are
+/// left, and for the last. Chosen: a tenth of the default `rtol`, and ten times it.
+const LOW_NOISE: f64 = 1e-11;
+const MAX_NOISE: f64 = 1e-9;
 
 /// Whether the family is defined for a case.
 fn is_in_domain(case: &Case) -> bool {
@@ -99,22 +119,10 @@ fn is_in_domain(case: &Case) -> bool {
     is_inside && [law.a, law.b, case.t_f, v_i, v_f].iter().all(|x| x.is_finite()) && !case.tau_ceiling.is_nan()
 }
 
-/// Relative change of some velocity in one more step, if the requested tolerance is tighter: above which the other direction is
-/// tried, and at most. Chosen: a hundredth of the default `rtol`, and ten times it.
-const LOW_NOISE: f64 = 1e-12;
-const MAX_NOISE: f64 = 1e-9;
-
-/// Member that solves a case.
-struct Member {
-    path: FrictionPath,
-    pass: Pass,
-    /// Relative change of some velocity in one more step.
-    noise: f64,
-}
-
-/// The member that solves the case, from the direction in which theta contracts or, where that has much rounding, the other.
-fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Member, Obstacle> {
+/// The path of the member that solves the case, and its panels.
+fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPath, Vec<FrictionPanel>), Obstacle> {
     let Transition { law, v_i, v_f } = case.transition;
+    let t_f = case.t_f;
     if !is_in_domain(case) {
         return Err(Obstacle::Domain);
     }
@@ -128,132 +136,230 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Member, Obs
     let log_ratio = if change.abs() < 0.5 { ln_1p(change) } else { ln(v_i / v_f) };
     let fraction = (law.a - law.b) * log_ratio / margin_i;
     let ln_r = if fraction.abs() < 0.5 { ln_1p(fraction) } else { ln(margin_f / margin_i) };
-    // Time beyond that of v = 0 or of tau = tau_M.
-    let spare = case.t_f
-        - if v_f > v_i {
+    let by_theta = FrictionPath::new(case, (margin_i, margin_f), ln_r, log_ratio, Residual::LnTheta);
+    if v_i == v_f {
+        let (_, panels) = last_pass(&by_theta, (rtol, 0.1 * rtol, 0.0), stats).map_err(|_| Obstacle::NotConverged)?;
+        return Ok((by_theta, panels));
+    }
+    // Spare time, beyond the time of v = 0 or of tau = tau_M.
+    let accelerates = v_f > v_i;
+    let spare = t_f
+        - if accelerates {
             acceleration_time_at_ceiling(law.a, v_i, -log_ratio, (margin_i, margin_f), stats)
-                .ok_or(Obstacle::NotConverged)?
         } else {
             (v_i - v_f) / v_i * (1.0 / v_f)
         };
     if spare <= 0.0 {
-        return Err(if v_f > v_i { Obstacle::Friction } else { Obstacle::Velocity });
+        return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
-    let path = FrictionPath::new(case, (margin_i, margin_f), ln_r, log_ratio, spare);
-    if v_i == v_f {
-        let pass = path.pass(ROUGH_ACCURACY, stats).map_err(|_| Obstacle::NotConverged)?;
-        return Ok(Member { path, pass, noise: 0.0 });
+    let residual = if accelerates { Residual::TimeLoss { spare } } else { Residual::Slip { spare } };
+    let by_time = by_theta.with_residual(residual);
+    let is_close = spare < SPARE_TIME_FRACTION * by_time.time_per_w(0.0).min(t_f);
+    // From a standstill theta grows, and errors decay forwards.
+    let by_time = if accelerates { by_time } else { by_time.towards(true) };
+    let both_ways = by_theta.towards(true).with_residual(Residual::TwoSidedSlip { spare });
+    // The loss of digits in a standstill grows with the ratio of the velocities, and b/a times where theta runs away.
+    let far = log_ratio > MIN_LN_RATIO || log_ratio * law.b > MIN_LN_THETA_RATIO * law.a;
+    let stands_still = !accelerates && far && t_f - spare > STANDSTILL_FRACTION * t_f;
+    let (times, thetas) = ([by_time, by_time.reversed()], [by_theta, by_theta.reversed()]);
+    let both_ways = if accelerates { &[][..] } else { &[both_ways] };
+    let mut order =
+        if is_close { [&times, &thetas[..], both_ways].concat() } else { [&thetas, both_ways, &times].concat() };
+    if stands_still {
+        order.sort_by_key(|path| !matches!(path.residual, Residual::TwoSidedSlip { .. }));
     }
-    let mut best = None;
-    for path in [path, path.reversed()] {
-        let found = search(&path, stats).and_then(|alpha| refine(path.with(alpha), rtol, stats));
-        let rounding = |member: &Member| member.noise.max(f64::EPSILON * member.pass.max_errors);
-        best = best.into_iter().chain(found).min_by(|x, y| rounding(x).total_cmp(&rounding(y)));
-        if best.as_ref().is_some_and(|best| rounding(best) <= LOW_NOISE) {
-            break;
+    // Rounding of the time, at the greater velocity.
+    let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
+    let rounds = [(LOW_NOISE.max(rtol), MAX_ERROR_GROWTH), (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY)];
+    for (max_noise, max_growth) in rounds {
+        for path in &order {
+            let found =
+                search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), (rtol, max_noise), stats));
+            if let Some(found) = found {
+                return Ok(found);
+            }
         }
     }
-    best.filter(|best| best.noise <= MAX_NOISE.max(rtol)).ok_or(Obstacle::NotConverged)
+    Err(Obstacle::NotConverged)
+}
+
+/// Passes after the first search, at most. Chosen: Newton's method needs two or three, and a dozen more where theta has
+/// almost relaxed at the end.
+const MAX_PASSES: u32 = 40;
+
+/// Relative change of some velocity in the last step, at most. Chosen; the budgets of `shortcut` judge it.
+const MAX_LAST_CHANGE: f64 = 1e-3;
+
+/// Tolerance at the nodes of the last pass, in units of `rtol`. Chosen: the rest is left for the other errors of the row.
+const LAST_PASS_FRACTION: f64 = 0.1;
+
+/// Tolerance at the nodes, at least: rounding. Chosen: nine hundred roundings of 1.1e-16, the noise of a long path.
+const MIN_TOLERANCE: f64 = 1e-13;
+
+/// Relative error of the target from rounding of `w`, at most. Chosen: a few operations of one rounding each.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// The pass that gives the work too, and the extremes, which lie between the nodes; `expected` is about the work.
+fn last_pass(
+    path: &FrictionPath,
+    (rtol, tolerance, expected): (f64, f64, f64),
+    stats: &mut SolverStats,
+) -> Result<(PassResult, Vec<FrictionPanel>), PassFailure> {
+    let accuracy = (LAST_PASS_FRACTION * rtol).max(MIN_TOLERANCE);
+    // A velocity carries the error of `ln theta` b/a times.
+    let nodes = accuracy / (1.0 + path.ratio);
+    let inside = nodes * nodes.sqrt() * (1.0 + path.ratio);
+    path.pass(tolerance.min(inside), Some(WorkTolerance { accuracy, expected }), stats)
+}
+
+/// Refines a path to the one that arrives, with its panels; `None` where this fails.
+fn refine(
+    mut path: FrictionPath,
+    (rtol, max_noise): (f64, f64),
+    stats: &mut SolverStats,
+) -> Option<(FrictionPath, Vec<FrictionPanel>)> {
+    let (mut is_last, mut before, mut tolerance, mut expected) = (false, f64::INFINITY, 0.1 * rtol, 0.0);
+    for _ in 0..MAX_PASSES {
+        let (end, panels) = if is_last {
+            last_pass(&path, (rtol, tolerance, 0.5 * expected), stats)
+        } else {
+            path.pass(tolerance, None, stats)
+        }
+        .ok()?;
+        expected = end.work;
+        let (_, step) = path.residual_and_step(&end);
+        let scale = path.alpha_resolution(&end);
+        let within = |fraction: f64| step.abs() <= fraction * scale;
+        // Newton's method has converged to rounding. Where neighbouring doubles differ by more, another residual may be
+        // better conditioned.
+        let are_neighbours = step.abs() <= f64::EPSILON * path.alpha.abs();
+        let spent = step.abs() <= ROUNDING * path.rounding(&end) && step.abs() >= 0.5 * before
+            || are_neighbours && within(0.5 * LOW_NOISE)
+            || path.alpha + step == path.alpha;
+        // Slips that add up to the spare time are known to its rounding. Theta at the end may determine alpha better. The
+        // rounding of t_f itself limits every residual.
+        let is_lost = is_last && ROUNDING * path.lost_in_sum(&end) > 0.5 * rtol.max(LOW_NOISE) * scale;
+        if end.noise * f64::EPSILON > max_noise || is_lost {
+            return None;
+        }
+        if is_last && (within(0.5 * rtol) || spent) {
+            // Where this residual depends on alpha by rounding only, it fails.
+            return within(MAX_LAST_CHANGE).then_some((path, panels));
+        }
+        if !step.is_finite() || is_last && are_neighbours {
+            return None;
+        }
+        // Tolerance of a panel for which the error at the end is that of the next step.
+        let next_tolerance = if path.residual == Residual::LnTheta {
+            5.0 * rtol * scale * end.w_by_alpha.abs() / (end.errors * path.size)
+        } else {
+            0.1 * rtol * (scale / path.alpha.abs()).min(1.0)
+        };
+        tolerance = next_tolerance.clamp(f64::MIN_POSITIVE, 0.1 * rtol);
+        // Newton's method doubles the digits.
+        is_last = within(rtol.sqrt()) || spent;
+        before = step.abs();
+        path = path.with(path.alpha + step);
+    }
+    None
 }
 
 /// Time of an acceleration with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`, in `l/v_0`.
 ///
-/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. The integral starts at the end that is closer to the pole at
-/// `z = 0`.
+/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. Panels double with `z`, which keeps the pole at
+/// `z = 0` at a distance.
 fn acceleration_time_at_ceiling(
     a: f64,
     v_i: f64,
     span: f64,
     (margin_i, margin_f): (f64, f64),
     stats: &mut SolverStats,
-) -> Option<f64> {
+) -> f64 {
+    let rule = rule(24);
     let (z_i, z_f) = (margin_i / a, margin_f / a);
-    let rate = |s: f64| {
-        let (fallen, z) = if z_i < z_f { (s, z_i + s * (z_f - z_i)) } else { (1.0 - s, z_f + s * (z_i - z_f)) };
-        Some([span * exp(-fallen * span) / v_i / exp_m1(z)])
-    };
-    let ([time], nodes) = integrals(rate, vec![(0.0, 1.0)], 1)?;
+    let growth = (z_f / z_i).abs().max(z_i / z_f);
+    let panels = (1.5 * ln(growth) + span).ceil().clamp(1.0, 400.0);
     stats.quadratures += 1;
-    stats.nodes += nodes;
-    Some(time)
+    let mut time = 0.0;
+    for panel in 0..panels as u32 {
+        // Fraction of the range of y, and z: geometric in z, or uniform in y where z hardly changes.
+        let fraction_and_z = |s: f64| {
+            if growth > 2.0 {
+                let power = s * ln(z_f / z_i);
+                (z_i * (exp_m1(power) / (z_f - z_i)), z_i * exp(power))
+            } else {
+                (s, z_i + s * (z_f - z_i))
+            }
+        };
+        let (low, high) = (fraction_and_z(f64::from(panel) / panels), fraction_and_z(f64::from(panel + 1) / panels));
+        stats.nodes += rule.x.len() as u32;
+        for (x, w) in rule.x.iter().zip(&rule.w) {
+            let between = |low: f64, high: f64| low + 0.5 * (high - low) * (1.0 + x);
+            let (fraction, z) = (between(low.0, high.0), between(low.1, high.1));
+            time += 0.5 * (high.0 - low.0) * w * span * exp(-fraction * span) / v_i / exp_m1(z);
+        }
+    }
+    time
 }
 
-/// Accuracy of velocities in the passes of the search. Chosen: the error at the end is of its power 3/2, less than [`SEARCH_RTOL`].
-const ROUGH_ACCURACY: f64 = 1e-3;
+/// Tolerance of the passes of the search. Chosen; the budgets of `shortcut` judge it.
+const SEARCH_TOLERANCE: f64 = 1e-4;
 
-/// Relative change of `alpha_3` that ends the search. Chosen: from three digits Newton's method takes two passes.
+/// Relative change of `alpha_3` that ends the search. Chosen: from three digits Newton's method takes two or three passes.
 const SEARCH_RTOL: f64 = 1e-3;
 
-/// Step of `asinh` of `alpha_3` in the search, at most. Chosen: a factor of 50 in `alpha_3`.
+/// Weight of a relative error of 1 of theta at the end, in the step that ends the search. Chosen; the budgets of `shortcut` judge it.
+const RESIDUAL_WEIGHT: f64 = 0.1;
+
+/// Step of the search, in units of [`FrictionPath::alpha_scale`] and of `1 + alpha_3`, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_SEARCH_STEP: f64 = 4.0;
 
-/// `alpha_3` to [`SEARCH_RTOL`], by Newton's method.
+/// `asinh` of `alpha_3` in units of [`FrictionPath::alpha_scale`], at most. Chosen; the budgets of `shortcut` judge it.
+const MAX_ASINH_ALPHA: f64 = 100.0;
+
+/// `alpha_3` to [`SEARCH_TOLERANCE`], by Newton's method; `None` where it fails, or where errors grow too much.
 ///
 /// Where the time is just long enough, layers at the ends have the width `1/alpha_3`: the search is in `asinh` of `alpha_3`.
-fn search(path: &FrictionPath, stats: &mut SolverStats) -> Option<f64> {
+fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Option<f64> {
     let alpha_scale = path.alpha_scale();
-    let alpha_at = |q: f64| alpha_scale * 0.5 * (exp_m1(q) - exp_m1(-q));
-    let mut before = f64::INFINITY;
+    let is_near = path.residual == Residual::LnTheta;
+    let (mut gave_up, mut errors) = (false, f64::INFINITY);
+    let alpha_at = |q: f64| alpha_scale * if is_near { q } else { 0.5 * (exp_m1(q) - exp_m1(-q)) };
     let probe = |q: f64| {
         let path = path.with(alpha_at(q));
-        let end = match path.pass(ROUGH_ACCURACY, stats) {
-            Ok(end) => end,
-            Err(Ordering::Greater) => return Some(Probe { value: f64::MAX, slope: 0.0 }),
-            Err(_) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
+        let end = match path.pass(SEARCH_TOLERANCE, None, stats) {
+            Ok((end, _)) => end,
+            Err(PassFailure::AlphaTooSmall) => return Some(Probe { value: -f64::MAX, slope: 0.0 }),
+            Err(PassFailure::AlphaTooLarge) => return Some(Probe { value: f64::MAX, slope: 0.0 }),
+            Err(PassFailure::NotConverged) => {
+                gave_up = true;
+                return Some(Probe { value: 0.0, slope: 0.0 });
+            }
         };
-        let (value, by_alpha) = path.residual(&end);
-        let slope = by_alpha * 0.5 * alpha_scale * (exp(q) + exp(-q));
-        // The step of q is its error.
-        let step = (value / slope).clamp(-MAX_SEARCH_STEP, MAX_SEARCH_STEP);
-        // Where theta falls exponentially, steps are small but do not shrink.
-        let converges = step.abs() <= 0.1 * before && value.abs() <= 0.1;
-        let weight = if converges { 1.0 } else { (2.0 * SEARCH_RTOL / step.abs()).max(1.0) };
-        before = step.abs();
-        Some(Probe { value: step * weight, slope: weight })
+        errors = end.errors;
+        let (value, step) = path.residual_and_step(&end);
+        if !is_near {
+            let alpha_by_q = 0.5 * alpha_scale * (exp(q) + exp(-q));
+            return Some(Probe { value, slope: (-value / step * alpha_by_q).max(0.0) });
+        }
+        // A step at most doubles alpha.
+        let scale = 1.0 + q.abs();
+        let step = (step / alpha_scale).clamp(-MAX_SEARCH_STEP * scale, MAX_SEARCH_STEP * scale);
+        if step.is_nan() || (step < 0.0) != (value > 0.0) {
+            return Some(Probe { value, slope: 0.0 });
+        }
+        // A step that is small compared with alpha may still pass the point where theta falls to 0. Theta may arrive almost
+        // independently of alpha: the growth of errors vanishes beyond.
+        let most = if errors > max_growth { 2.0 * SEARCH_RTOL } else { RESIDUAL_WEIGHT * value.abs() / path.size };
+        let weight = (1.0 / scale).max(most / step.abs());
+        Some(Probe { value: -step * weight, slope: weight })
     };
-    let far = ln_1p(4.0 * path.t_f / path.spare);
-    let start = if path.accelerates { -far } else { far };
-    let root = newton(probe, start, (f64::NEG_INFINITY, f64::INFINITY), false, SEARCH_RTOL)?;
-    Some(alpha_at(root.x))
-}
-
-/// Passes after the search, at most. Chosen: Newton's method needs two or three.
-const MAX_PASSES: u32 = 40;
-
-/// Accuracy of the velocities of the last pass, in units of `rtol`. Chosen: the rest is left for the other errors of the row.
-const LAST_PASS_FRACTION: f64 = 0.1;
-
-/// Accuracy of the velocities, at least: rounding. Chosen: nine hundred roundings of 1.1e-16, the noise of a long path.
-const MIN_ACCURACY: f64 = 1e-13;
-
-/// Last step, in units of the accuracy of the velocities. Chosen: theta at the ends is then better than the velocities inside.
-const LAST_STEP_FRACTION: f64 = 0.1;
-
-/// Refines a path to the one that arrives, with its last pass; `None` where this fails.
-fn refine(mut path: FrictionPath, rtol: f64, stats: &mut SolverStats) -> Option<Member> {
-    let fine = (LAST_PASS_FRACTION * rtol).max(MIN_ACCURACY);
-    // The error at the end is of the power 3/2.
-    let (mut accuracy, mut before) = (exp(0.75 * ln(fine)), f64::INFINITY);
-    for _ in 0..MAX_PASSES {
-        let pass = path.pass(accuracy, stats).ok()?;
-        let (value, by_alpha) = path.residual(&pass);
-        let step = -value / by_alpha;
-        let error = (step / path.alpha).abs().max(step.abs() * pass.max_ln_v_by_alpha);
-        let is_fine = accuracy == fine;
-        let stalls = step.abs() >= 0.5 * before || path.alpha + step == path.alpha;
-        if is_fine && (error <= LAST_STEP_FRACTION * fine || stalls) {
-            // A step within the tolerance is none of rounding.
-            let noise = if error <= rtol { 0.0 } else { step.abs() * pass.max_visible_by_alpha };
-            return Some(Member { path, pass, noise });
-        }
-        if !step.is_finite() {
-            return None;
-        }
-        before = step.abs();
-        if !is_fine && (stalls || error <= rtol.sqrt()) {
-            (accuracy, before) = (fine, f64::INFINITY);
-        }
-        path = path.with(path.alpha + step);
-    }
-    None
+    let far = ln_1p(4.0 * path.t_f / path.residual.spare().unwrap_or(f64::INFINITY));
+    let (start, most) = match path.residual {
+        Residual::LnTheta => (0.0, f64::INFINITY),
+        Residual::Slip { .. } | Residual::TwoSidedSlip { .. } => (far, MAX_ASINH_ALPHA),
+        Residual::TimeLoss { .. } => (-far, MAX_ASINH_ALPHA),
+    };
+    let root = newton(probe, start, (-most, most), false, SEARCH_RTOL)?;
+    (!gave_up && errors <= max_growth).then(|| alpha_at(root.x))
 }

@@ -22,16 +22,17 @@ impl Motion for BoundedFrictionMotion {
     }
 
     fn at(&self, s: f64) -> Moment {
-        let (path, count) = (&self.path, self.panels.len());
+        let count = self.panels.len();
         let along = s.clamp(0.0, 1.0) * count as f64;
         let k = (along as usize).min(count - 1);
         let (panel, fraction) = (&self.panels[k], along - k as f64);
-        let fraction = if path.forward { fraction } else { 1.0 - fraction };
-        let (side, d, w) = (panel.side, panel.distance(fraction), panel.level(fraction));
-        let x = if path.forward == (side == PathEnd::Start) { d } else { 1.0 - d };
+        let path = self.path.towards(panel.forward);
+        let fraction = if panel.forward { fraction } else { 1.0 - fraction };
+        let (side, d, (w, z)) = (panel.side, panel.distance(fraction), panel.state(&path, fraction));
+        let x = if panel.forward == (side == PathEnd::Start) { d } else { 1.0 - d };
         Moment {
-            t: path.t_f * x,
-            v: path.velocity(side, d, w),
+            t: self.path.t_f * x,
+            v: path.velocity(side, w, z),
             theta: exp(w) / path.end_state(side).v,
             friction: path.friction(side, d),
             beta: None,

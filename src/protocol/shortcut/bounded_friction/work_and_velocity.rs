@@ -11,48 +11,77 @@ pub(super) struct WorkAndVelocity {
     pub work: f64,
     pub v_min: f64,
     pub v_max: f64,
+    /// Whether the velocity rises at the end of the last panel, and its value there.
+    last: Option<(bool, f64)>,
 }
-
-/// Bisections for an extremum. Derived: the error of its value is quadratic in the width of the bracket.
-const MAX_HALVINGS: u32 = 28;
 
 impl WorkAndVelocity {
     /// Work and velocity of a transition along the panels of a pass.
     pub fn of(transition: &Transition, path: &FrictionPath, panels: &[FrictionPanel]) -> WorkAndVelocity {
         let Transition { v_i, v_f, .. } = *transition;
-        if v_i == v_f {
-            let work = path.friction(PathEnd::Start, 0.0) * v_i * path.t_f;
-            return WorkAndVelocity { work, v_min: v_i, v_max: v_i };
-        }
-        let mut all = WorkAndVelocity { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f) };
-        let mut rising = None;
-        panels.iter().for_each(|panel| all.add(path, panel, &mut rising));
+        let mut all = WorkAndVelocity { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f), last: None };
+        panels.iter().for_each(|panel| all.add(&path.towards(panel.forward), panel));
         all
     }
 
-    /// Adds one panel; `rising` is whether the velocity rises at its start and, then, at its end.
-    fn add(&mut self, path: &FrictionPath, panel: &FrictionPanel, rising: &mut Option<bool>) {
-        let (rule, side) = (radau(), panel.side);
-        let rises_at = |s: f64, w: f64| path.ln_v_slope(side, panel.distance(s), w) > 0.0;
+    /// Work and velocity of steady sliding.
+    pub fn steady(path: &FrictionPath, v: f64) -> WorkAndVelocity {
+        WorkAndVelocity { work: path.friction(PathEnd::Start, 0.0) * v * path.t_f, v_min: v, v_max: v, last: None }
+    }
+
+    /// Adds one panel.
+    fn add(&mut self, path: &FrictionPath, panel: &FrictionPanel) {
+        let rule = radau();
         let (mut before, mut sum) = (0.0, 0.0);
-        let nodes = (0..NODES).map(|j| (rule.u[j], panel.w[j], rule.w[j]));
+        let (_, z) = panel.state(path, 0.0);
+        let mut bend_before = path.ln_v_slope(panel.side, panel.from, panel.start, z);
         // An extremum may lie between two panels, where theta begins to follow the velocity.
-        for (s, w, weight) in std::iter::once((0.0, panel.start, 0.0)).chain(nodes) {
-            let d = panel.distance(s);
-            sum += weight * path.friction(side, d) * path.velocity(side, d, w);
-            let rises = rises_at(s, w);
-            if *rising == Some(!rises) {
-                // The extremum, by bisection.
-                let (mut low, mut high) = (before, s);
-                for _ in 0..MAX_HALVINGS {
-                    let middle = 0.5 * (low + high);
-                    if rises_at(middle, panel.level(middle)) == rises { high = middle } else { low = middle }
-                }
-                let v = path.velocity(side, panel.distance(low), panel.level(low));
-                (self.v_min, self.v_max) = (self.v_min.min(v), self.v_max.max(v));
-            }
-            (before, *rising) = (s, Some(rises));
+        if panel.side == PathEnd::Start && panel.from == 0.0 {
+            self.last = None;
         }
+        if let Some((_, v)) = self.last.filter(|&(rises, _)| rises != (bend_before > 0.0)) {
+            self.add_velocity(v);
+        }
+        for j in 0..NODES {
+            let (d, w, z) = (panel.distance(rule.u[j]), panel.w[j], panel.z[j]);
+            sum += rule.w[j] * path.friction(panel.side, d) * path.velocity(panel.side, w, z);
+            let ln_v_slope = path.ln_v_slope(panel.side, d, w, z);
+            if (ln_v_slope > 0.0) != (bend_before > 0.0) {
+                self.add_extremum(path, panel, (before, rule.u[j]), bend_before > 0.0);
+            }
+            (before, bend_before) = (rule.u[j], ln_v_slope);
+        }
+        self.last = Some((bend_before > 0.0, path.velocity(panel.side, panel.w[NODES - 1], panel.z[NODES - 1])));
         self.work += path.t_f * (panel.to - panel.from).abs() * sum;
     }
+
+    /// Adds the extremum between two fractions of a panel, by bisection.
+    fn add_extremum(
+        &mut self,
+        path: &FrictionPath,
+        panel: &FrictionPanel,
+        (mut low, mut high): (f64, f64),
+        rising: bool,
+    ) {
+        for _ in 0..MAX_HALVINGS {
+            let middle = 0.5 * (low + high);
+            let (w, z) = panel.state(path, middle);
+            if (path.ln_v_slope(panel.side, panel.distance(middle), w, z) > 0.0) == rising {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let (w, z) = panel.state(path, low);
+        self.add_velocity(path.velocity(panel.side, w, z));
+    }
+
+    /// Extends the range to a velocity.
+    fn add_velocity(&mut self, v: f64) {
+        self.v_min = self.v_min.min(v);
+        self.v_max = self.v_max.max(v);
+    }
 }
+
+/// Bisections for an extremum. Derived: the error of its value is quadratic in the width of the bracket.
+const MAX_HALVINGS: u32 = 28;
