@@ -206,8 +206,7 @@ impl Followed {
     /// Compares the least and the greatest velocity, and returns them.
     pub fn compare_velocities(&self, verdict: &mut Verdict, row: &Row) -> [f64; 2] {
         let v = [self.least(|at| at.v), self.greatest(|at| at.v)];
-        // Below the normal numbers a velocity has fewer digits.
-        verdict.compare(row, "v_min", Some(v[0]), Some(v[0].max(f64::MIN_POSITIVE)));
+        verdict.compare(row, "v_min", Some(v[0]), None);
         verdict.compare(row, "v_max", Some(v[1]), None);
         v
     }

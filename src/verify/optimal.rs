@@ -30,7 +30,7 @@ pub struct Optimum {
 /// Distance from a ceiling, relative to 1 plus the ceiling, below which a moment is on it. Chosen: some roundings.
 const CEILING_RTOL: f64 = 1e-14;
 
-/// Times that an interval of a motion may be halved. Chosen: layers at the ends of arcs are thin.
+/// Times that an interval of a motion may be halved. Chosen: a 64th of an interval resolves the layers at the ends of arcs.
 const MAX_SPLITS: u32 = 6;
 
 /// Logarithm of the growth of an error on the ceilings, beyond which `C` does not determine the rest of the path. Derived: `e^12` roundings are 2e-11, a
@@ -218,7 +218,7 @@ impl Optimum {
             return;
         }
         if !self.has_slopes {
-            return verdict.miss("derivatives of rows that slide steadily on a ceiling");
+            return verdict.miss("derivatives of rows that slide long on a ceiling");
         }
         for ((column, slope, noise), (_, other, _)) in self.slopes().into_iter().zip(near.slopes()) {
             let size = if slope == 0.0 { 1.0 } else { slope.abs() };

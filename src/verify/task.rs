@@ -93,10 +93,13 @@ impl Task {
     /// Time on the ceilings from one end to the other.
     fn time_on_ceilings(&self) -> Option<f64> {
         let [start, end] = self.ends();
-        let slope = |y: &[f64; 2]| [1.0, -y[0].exp() / self.t_f / self.cap(y[0]).exp_m1()];
+        let rate = |l: f64| -l.exp() / self.cap(l).exp_m1();
+        // About the time itself: below its absolute tolerance the integrator has no digits.
+        let unit = (end - start).abs() * rate(start).abs().max(rate(end).abs());
+        let slope = |y: &[f64; 2]| [1.0, rate(y[0]) / unit];
         let middle = self.crossing().unwrap_or(end);
         let time = integrate(slope, [start, 0.0], (start, middle))?[1];
-        Some(self.t_f * integrate(slope, [middle, time], (middle, end))?[1])
+        Some(unit * integrate(slope, [middle, time], (middle, end))?[1])
     }
 
     /// The least and the greatest feasible time; `None` where rounding decides.

@@ -66,8 +66,8 @@ impl Verdict {
             // Also where both are infinite.
             (Cell::Number(found), Some(expected)) if *found == expected => 0.0,
             (Cell::Number(found), Some(expected)) => {
-                let size = scale.unwrap_or(expected.abs());
-                (found - expected).abs() / size
+                // Below the normal numbers digits are missing.
+                (found - expected).abs() / scale.unwrap_or(expected.abs()).max(f64::MIN_POSITIVE)
             }
             _ => f64::INFINITY,
         };

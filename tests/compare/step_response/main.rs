@@ -29,11 +29,10 @@ struct Answer {
     numbers: [f64; 4],
 }
 
-/// A point of the physical domain in one version's types.
+/// The answer of a step in the types of either version.
 macro_rules! respond {
-    ($point:expr, $rtol:expr, $step:expr) => {{
-        let (_, response) = $step.respond($rtol);
-        match response {
+    ($step:expr, $rtol:expr) => {
+        match $step.respond($rtol).1 {
             None => Answer { outcome: 3, numbers: [f64::NAN; 4] },
             Some(response) => Answer {
                 outcome: response.outcome as usize,
@@ -45,9 +44,10 @@ macro_rules! respond {
                 ],
             },
         }
-    }};
+    };
 }
 
+/// A point of the physical domain, in units of `v_0`, `l` and `mu_0 sigma`.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     a: f64,
@@ -57,6 +57,7 @@ struct Point {
     m: f64,
 }
 
+/// Final velocity of every step. Chosen: only `m v_f^2` and `v_i/v_f` matter.
 const V_F: f64 = 1e6;
 
 impl Point {
@@ -81,14 +82,14 @@ impl Point {
     fn before(&self, rtol: f64) -> Answer {
         use before::model::{Law, Transition};
         let transition = Transition { law: Law { a: self.a, b: self.b }, v_i: self.v_i, v_f: V_F };
-        respond!(self, rtol, before::stability::response::Step { transition, k: self.k, m: self.m })
+        respond!(before::stability::response::Step { transition, k: self.k, m: self.m }, rtol)
     }
 
     fn after(&self, rtol: f64) -> Answer {
         use after::model::{Law, StateLaw, Transition};
         use after::stability::step_response::VelocityStep;
         let transition = Transition { law: Law { a: self.a, b: self.b }, v_i: self.v_i, v_f: V_F };
-        respond!(self, rtol, VelocityStep { state_law: StateLaw::Ageing, transition, k: self.k, m: self.m })
+        respond!(VelocityStep { state_law: StateLaw::Ageing, transition, k: self.k, m: self.m }, rtol)
     }
 }
 
@@ -114,7 +115,7 @@ fn thread_time() -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// What one version did at all points.
+/// The outcomes, time and errors of one version.
 #[derive(Clone, Default)]
 struct Totals {
     outcomes: [usize; 4],
@@ -122,8 +123,8 @@ struct Totals {
     /// Largest relative errors against the judge, and how many points are off by more than 2 `RTOL`.
     errors: [f64; 4],
     off: usize,
-    /// Decided otherwise than by the judge.
-    otherwise: usize,
+    /// Points with another outcome than the judge's.
+    wrong_outcomes: usize,
 }
 
 impl Totals {
@@ -134,7 +135,7 @@ impl Totals {
         }
         self.seconds += other.seconds;
         self.off += other.off;
-        self.otherwise += other.otherwise;
+        self.wrong_outcomes += other.wrong_outcomes;
         self
     }
 
@@ -143,7 +144,7 @@ impl Totals {
             return;
         }
         if found.outcome != judge.outcome {
-            self.otherwise += 1;
+            self.wrong_outcomes += 1;
             println!("{name}: {} for {}: {point:?}", OUTCOMES[found.outcome], OUTCOMES[judge.outcome]);
             return;
         }
@@ -160,13 +161,14 @@ impl Totals {
     }
 }
 
+/// The totals of both versions.
 #[derive(Clone, Default)]
 struct Both {
     before: Totals,
     after: Totals,
     judged: usize,
     undecided_judges: usize,
-    /// Largest difference of the versions where no judge was asked.
+    /// Largest difference of the versions at points that are not judged.
     largest_agreed: f64,
 }
 
@@ -216,7 +218,7 @@ impl Both {
             println!("{name}: {}, {:.2} ms of a core each", outcomes.join(", "), 1e3 * totals.seconds / count as f64);
             println!(
                 "  {} outcomes wrong, {} points off by more than 2 rtol; largest errors:",
-                totals.otherwise, totals.off
+                totals.wrong_outcomes, totals.off
             );
             for (name, error) in NUMBERS.iter().zip(totals.errors) {
                 println!("    {name:13} {error:.1e}");
@@ -226,7 +228,7 @@ impl Both {
 }
 
 fn main() {
-    let count: usize = std::env::args().nth(1).and_then(|count| count.parse().ok()).expect("POINTS");
+    let count: usize = std::env::args().nth(1).and_then(|count| count.parse().ok()).expect("the number of points");
     let points = Point::all(count);
     let (mut all, mut done) = (Both::default(), 0);
     for chunk in points.chunks(CHUNK) {
@@ -234,5 +236,8 @@ fn main() {
         all = all.plus(&found.reduce(Both::default, |one, other| one.plus(&other)));
         done += chunk.len();
         all.print(done);
+    }
+    if all.after.wrong_outcomes + all.after.off > 0 {
+        std::process::exit(1);
     }
 }
