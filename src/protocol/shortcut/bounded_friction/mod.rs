@@ -31,8 +31,8 @@ mod work_and_velocity;
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::Transition;
+use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
-use crate::numerics::gauss::rule;
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Motion, SolverStats};
 use friction_margin::friction_margin;
@@ -146,6 +146,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     let spare = t_f
         - if accelerates {
             acceleration_time_at_ceiling(law.a, v_i, -log_ratio, (margin_i, margin_f), stats)
+                .ok_or(Obstacle::NotConverged)?
         } else {
             (v_i - v_f) / v_i * (1.0 / v_f)
         };
@@ -264,42 +265,25 @@ fn refine(
     None
 }
 
-/// Time of an acceleration with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`, in `l/v_0`.
+/// Time of an acceleration with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`, in `l/v_0`; `None` where the quadrature fails.
 ///
-/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. Panels double with `z`, which keeps the pole at
-/// `z = 0` at a distance.
+/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. Panels are halved towards the end that is nearer to the
+/// pole at `z = 0`.
 fn acceleration_time_at_ceiling(
     a: f64,
     v_i: f64,
     span: f64,
     (margin_i, margin_f): (f64, f64),
     stats: &mut SolverStats,
-) -> f64 {
-    let rule = rule(24);
+) -> Option<f64> {
     let (z_i, z_f) = (margin_i / a, margin_f / a);
-    let growth = (z_f / z_i).abs().max(z_i / z_f);
-    let panels = (1.5 * ln(growth) + span).ceil().clamp(1.0, 400.0);
-    stats.quadratures += 1;
-    let mut time = 0.0;
-    for panel in 0..panels as u32 {
-        // Fraction of the range of y, and z: geometric in z, or uniform in y where z hardly changes.
-        let fraction_and_z = |s: f64| {
-            if growth > 2.0 {
-                let power = s * ln(z_f / z_i);
-                (z_i * (exp_m1(power) / (z_f - z_i)), z_i * exp(power))
-            } else {
-                (s, z_i + s * (z_f - z_i))
-            }
-        };
-        let (low, high) = (fraction_and_z(f64::from(panel) / panels), fraction_and_z(f64::from(panel + 1) / panels));
-        stats.nodes += rule.x.len() as u32;
-        for (x, w) in rule.x.iter().zip(&rule.w) {
-            let between = |low: f64, high: f64| low + 0.5 * (high - low) * (1.0 + x);
-            let (fraction, z) = (between(low.0, high.0), between(low.1, high.1));
-            time += 0.5 * (high.0 - low.0) * w * span * exp(-fraction * span) / v_i / exp_m1(z);
-        }
-    }
-    time
+    let rate = |s: f64| {
+        let (fallen, z) = if z_i < z_f { (s, z_i + s * (z_f - z_i)) } else { (1.0 - s, z_f + s * (z_i - z_f)) };
+        Some([span * exp(-fallen * span) / v_i / exp_m1(z)])
+    };
+    let ([time], nodes) = integrals(rate, vec![(0.0, 1.0)], 1)?;
+    *stats += SolverStats { quadratures: 1, nodes };
+    Some(time)
 }
 
 /// Tolerance of the passes of the search. Chosen; the budgets of `shortcut` judge it.
