@@ -254,6 +254,14 @@ def cases():
         t_f = max(1 / v_f - 1 / v_i, 0.0) + 10 ** chance.uniform(-4, 1.5) / v_f
         ends = max(1 + (a - b) * math.log(v) for v in (v_i, v_f))
         yield a, b, v_i, v_f, t_f, ends + 10 ** chance.uniform(-3, 1)
+    yield from close_ceilings()
+
+
+def close_ceilings():
+    """Times and friction ceilings just above the least: the spare time is a small difference."""
+    for a, b, v_i, v_f, excess in ((0.18, 0.0, 1.1, 1000.0, 1e-4), (0.27, 0.06, 7.0, 1e6, 1e-3), (0.03, 0.05, 3.0, 100.0, 1e-4)):
+        tau_ceiling = max(1 + (a - b) * math.log(v) for v in (v_i, v_f)) + 5e-9
+        yield a, b, v_i, v_f, float(fastest((a, b, v_i, v_f, 0.0, tau_ceiling))) * (1 + excess), tau_ceiling
 
 
 def slowing():
