@@ -170,6 +170,8 @@ class Course:
                 speeds.append(arb(0))
                 return
             work = (work + part).mid()
+            # Where tau is tau_ceiling to all digits, the velocity may be constant.
+            speeds.append(log_v[0].exp())
             slope = arb_poly(log_v.derivative().coeffs())
             places = [h * i / 16 for i in range(17)]
             for low, high in zip(places, places[1:]):
@@ -187,8 +189,9 @@ class Course:
         vertex = (slope_r / alpha + 1) / 2
         if alpha < 0 and vertex > 0 and vertex < 1:
             friction.append(self.tau_ceiling - gap * (vertex * (slope_r + alpha * (1 - vertex))).exp())
-        least = min(speeds, key=float)
-        return [x.mid() for x in (work, least if least > 1e-307 else arb(0), max(speeds, key=float), max(friction, key=float))]
+        speeds = [v.mid() for v in speeds]
+        least = min(speeds)
+        return [x.mid() for x in (work, least if least > 1e-307 else arb(0), max(speeds), max(friction, key=float))]
 
 
 def least_time(case):
@@ -201,6 +204,7 @@ def least_time(case):
 
 def fastest(case):
     """Time from 1/v_i to 1/v_f with tau = tau_ceiling: int dtheta/(theta v - 1), by Gauss-Legendre in ln theta, cuts crowded at both ends."""
+    ctx.prec = FINE[0]
     a, b, v_i, v_f, _, tau_ceiling = case
     nodes = [(arb.legendre_p_root(8, k, True)) for k in range(8)]
     z_i, z_f = ((tau_ceiling - 1 - (a - b) * arb(v).log()) / a for v in (v_i, v_f))
