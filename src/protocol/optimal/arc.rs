@@ -80,6 +80,36 @@ pub(super) struct Sums {
     pub nodes: u32,
 }
 
+impl Default for Sums {
+    fn default() -> Sums {
+        Sums {
+            time: 0.0,
+            lag: 0.0,
+            work: 0.0,
+            creep: 0.0,
+            state: 0.0,
+            sensitivity: 0.0,
+            swing: 0.0,
+            friction_min: f64::INFINITY,
+            nodes: 0,
+        }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, other: &Sums) {
+        self.time += other.time;
+        self.lag += other.lag;
+        self.work += other.work;
+        self.creep += other.creep;
+        self.state += other.state;
+        self.sensitivity += other.sensitivity;
+        self.swing += other.swing;
+        self.friction_min = self.friction_min.min(other.friction_min);
+        self.nodes += other.nodes;
+    }
+}
+
 /// Least and greatest friction of a part of an arc with the constant `c` between two points: at one of them, or where it is
 /// stationary in between.
 ///
@@ -203,34 +233,15 @@ impl Arc {
     /// Time, work and sensitivity to relative accuracy `tolerance`, with `SLOPES` also the sums for the derivatives of the work;
     /// `None` where the arc does not exist (`E < 0` on the way).
     pub fn sums<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
-        let mut sums = self.sums_once::<SLOPES>(tolerance)?;
-        // Where friction falls below b - a, E has a minimum on the way: zeros near it need more nodes than foreseen.
-        let mut asked = tolerance;
-        while sums.friction_min <= self.law.b - self.law.a && asked > LEAST_TOLERANCE {
-            asked *= asked.min(1e-3);
-            let finer = self.sums_once::<SLOPES>(asked)?;
-            let change = (finer.time - sums.time).abs();
-            sums = Sums {
-                nodes: sums.nodes + finer.nodes,
-                friction_min: sums.friction_min.min(finer.friction_min),
-                ..finer
-            };
-            if change <= tolerance * finer.time {
-                break;
-            }
-        }
-        Some(sums)
-    }
-
-    fn sums_once<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
+        let steep = self.law.b - self.law.a;
         let sums = match self.chart {
             Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
                 let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
-                panels(&line, tolerance, |middle, half, rule| turning_kernel::<SLOPES>(&slice, middle, half, rule))
+                line.sums(tolerance, steep, |middle, half, rule| turning_kernel::<SLOPES>(&slice, middle, half, rule))
             }
             Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
                 let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
-                panels(&line, tolerance, |middle, half, rule| direct_kernel::<SLOPES>(&slice, middle, half, rule))
+                line.sums(tolerance, steep, |middle, half, rule| direct_kernel::<SLOPES>(&slice, middle, half, rule))
             }
         };
         (sums.time.is_finite() && sums.work.is_finite()).then_some(sums)
@@ -366,6 +377,38 @@ impl<const N: usize> Line<N> {
             count *= 2;
         }
     }
+
+    /// Sums over equal panels, with as many Gauss nodes as the nearest singularity needs; where friction falls to `steep`, `b - a`, over
+    /// halved panels instead: there a zero of `E` may be close to an end.
+    fn sums(&self, tolerance: f64, steep: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
+        let (count, nodes) = self.cut(MAX_NODES, MAX_PANELS, tolerance);
+        let rule = rule(LANES * (nodes as usize / LANES + 1));
+        let half = 0.5 * self.length / f64::from(count);
+        let mut total = Sums::default();
+        for panel in 0..count {
+            total.add(&kernel(self.start + half * f64::from(2 * panel + 1), half, rule));
+        }
+        if total.friction_min > steep { total } else { self.halved(tolerance, total, kernel) }
+    }
+
+    /// The sums after those `before`, over panels that are halved until two rules agree.
+    fn halved(&self, tolerance: f64, before: Sums, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
+        let (mut total, mut panels) =
+            (Sums { nodes: before.nodes, ..Sums::default() }, vec![(self.start, self.length)]);
+        for _ in 0..MAX_HALVINGS {
+            let Some((start, length)) = panels.pop() else { break };
+            let half = 0.5 * length;
+            let [coarse, fine] = [2 * LANES, 4 * LANES].map(|nodes| kernel(start + half, half, rule(nodes)));
+            // NaN, where there is no arc, stays.
+            if (fine.time - coarse.time).abs() > tolerance.max(AGREEMENT) * before.time {
+                panels.extend([(start + half, half), (start, half)]);
+            } else {
+                total.add(&fine);
+            }
+            total.nodes += coarse.nodes;
+        }
+        if panels.is_empty() { total } else { Sums { time: f64::NAN, ..total } }
+    }
 }
 
 /// An arc in equal pieces of its chart's coordinate.
@@ -456,40 +499,11 @@ const MAX_NODES: f64 = 64.0;
 /// Most panels of an arc. Chosen: a limit on the work; 64 panels of 64 nodes.
 const MAX_PANELS: u32 = 64;
 
-/// The tolerance at which a quadrature uses the greatest numbers of panels and nodes. Chosen: far below every rounding.
-const LEAST_TOLERANCE: f64 = 1e-200;
+/// Relative difference of two rules that is rounding. Chosen: a hundred roundings.
+const AGREEMENT: f64 = 1e-14;
 
-/// Sums over equal panels of a line, with as many Gauss nodes as the nearest singularity needs.
-fn panels<const N: usize>(line: &Line<N>, tolerance: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
-    let &Line { start, length, .. } = line;
-    let (count, nodes) = line.cut(MAX_NODES, MAX_PANELS, tolerance);
-    let rule = rule(LANES * (nodes as usize / LANES + 1));
-    let half = 0.5 * length / f64::from(count);
-    let mut total = Sums {
-        time: 0.0,
-        lag: 0.0,
-        work: 0.0,
-        creep: 0.0,
-        state: 0.0,
-        sensitivity: 0.0,
-        swing: 0.0,
-        friction_min: f64::INFINITY,
-        nodes: 0,
-    };
-    for panel in 0..count {
-        let sums = kernel(start + half * f64::from(2 * panel + 1), half, rule);
-        total.time += sums.time;
-        total.lag += sums.lag;
-        total.work += sums.work;
-        total.creep += sums.creep;
-        total.state += sums.state;
-        total.sensitivity += sums.sensitivity;
-        total.swing += sums.swing;
-        total.friction_min = total.friction_min.min(sums.friction_min);
-        total.nodes += sums.nodes;
-    }
-    total
-}
+/// Most panels that are visited where they are halved. Chosen: five times what two ends of sixty halvings need.
+const MAX_HALVINGS: u32 = 1000;
 
 /// Gauss nodes for relative accuracy `e^-digits` on a panel: the Bernstein ellipse through the nearest singularity.
 #[inline(always)]

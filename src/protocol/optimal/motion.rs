@@ -8,6 +8,7 @@ use super::constrained::{Constrained, Sitting};
 use super::extremal::Problem;
 use super::lifetime::Lifetime;
 use super::search::ROUNDING;
+use super::slopes::costate_off_bounds;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::{Moment, Motion};
@@ -82,8 +83,7 @@ impl OptimalMotion {
                     theta: here.theta,
                     friction,
                     v_c: None,
-                    // C - a v, which cancels where v is large.
-                    beta: Some(-(friction + a) / here.theta),
+                    beta: Some(-costate_off_bounds(&self.problem.law, arc.c, &here)),
                 }
             }
             Segment::Ceiling(timed) => timed.moment(&self.ceilings, place),

@@ -1,6 +1,6 @@
 //! Derivatives of the least work along a path (envelope theorem), the costate and the gain of the feedback law.
 
-use super::arc::{Chart, omega};
+use super::arc::{ArcPoint, Chart, omega};
 use super::clamp::{ClampedPiece, Path};
 use super::constrained::Sitting;
 use super::extremal::Problem;
@@ -79,7 +79,7 @@ fn along(problem: &Problem, path: &Path, tolerance: f64, stats: &mut SolverStats
     let (theta_i, theta_f) = (problem.from.theta, problem.to.theta);
     slopes.v_i = -costate(problem, path)? * theta_i * theta_i;
     let last = path.pieces().last()?;
-    slopes.v_f = pressure(problem.law, last, true) * theta_f * theta_f;
+    slopes.v_f = pressure(problem.law, path.extremal.arc.c(), last, true) * theta_f * theta_f;
     Some(slopes)
 }
 
@@ -89,18 +89,32 @@ pub(super) fn costate(problem: &Problem, path: &Path) -> Option<f64> {
     if held > 0.0 {
         return Some(-motion::Floor::new(problem, path.extremal.theta_s, held).costate_at_start());
     }
-    Some(pressure(problem.law, path.pieces().next()?, false))
+    Some(pressure(problem.law, path.extremal.arc.c(), path.pieces().next()?, false))
 }
 
-/// `(tau v + C)/(u - 1) = [tau + a - G/(u - 1)]/theta` at the start or at the end of a piece.
-fn pressure(law: Law, piece: &ClampedPiece, at_end: bool) -> f64 {
+/// `(tau v + C)/(u - 1) = [tau + a - G/(u - 1)]/theta` at the start or at the end of a piece of a path of constant `c`.
+fn pressure(law: Law, c: f64, piece: &ClampedPiece, at_end: bool) -> f64 {
     let (theta, z) = piece.ends()[usize::from(at_end)];
-    let friction = 1.0 + law.a * z + (law.b - law.a) * ln(theta);
-    let pressed = match piece {
-        ClampedPiece::Free { .. } => 0.0,
-        ClampedPiece::Ceiling { arc, gap } => gap.value(arc.end(arc.falls() != at_end)) / exp_m1(z),
-    };
-    (friction + law.a - pressed) / theta
+    match piece {
+        ClampedPiece::Free { .. } => costate_off_bounds(&law, c, &ArcPoint { theta, ln_theta: ln(theta), ln_u: z }),
+        ClampedPiece::Ceiling { arc, gap } => {
+            let friction = 1.0 + law.a * z + (law.b - law.a) * ln(theta);
+            (friction + law.a - gap.value(arc.end(arc.falls() != at_end)) / exp_m1(z)) / theta
+        }
+    }
+}
+
+/// `(tau + a)/theta = a v - C` on a free arc, by the sum of the smaller terms: the first cancels where `tau` is close to `-a`, the second where `v`
+/// is large.
+pub(super) fn costate_off_bounds(law: &Law, c: f64, point: &ArcPoint) -> f64 {
+    let &ArcPoint { theta, ln_theta, ln_u } = point;
+    let terms = [law.a * ln_u, (law.b - law.a) * ln_theta];
+    let driven = law.a * exp(ln_u - ln_theta);
+    if driven.max(c.abs()) * theta < 1.0 + terms[0].abs() + terms[1].abs() {
+        driven - c
+    } else {
+        (1.0 + law.a + terms[0] + terms[1]) / theta
+    }
 }
 
 /// `dv/dtheta` at the start, for a fixed time left.
