@@ -390,42 +390,67 @@ fn paper_equations_integrated_from_our_start_arrive_with_our_work() {
         (Transition { v_f: 2.99, ..PAPER }, 0.01),
     ];
     for (transition, t_f) in cases {
-        let Transition { law, v_i, v_f } = transition;
         let found = optimum(&transition, t_f, true);
-        // The hold in closed form for theta, by quadrature in steps of the integrator for its work.
-        let theta_c = 1.0 - (1.0 - 1.0 / v_i) * (-found.time_at_floor).exp();
-        let tau = |v: f64, theta: f64| 1.0 + law.a * v.ln() + law.b * theta.ln();
-        let steps = 20_000;
-        let h = found.time_at_floor / f64::from(steps);
-        let held: f64 =
-            (0..steps).map(|i| tau(1.0, 1.0 - (1.0 - 1.0 / v_i) * (-(f64::from(i) + 0.5) * h).exp()) * h).sum();
-        let beta = -(law.a + tau(found.v_start, theta_c)) / theta_c;
-        let start = SVector::<f64, 3>::new(theta_c, beta, 0.0);
-        let rest = t_f - found.time_at_floor;
-        // Defaults but for the output: accepted steps only, the last of which is the end.
-        let mut integrator = Dop853::from_param(
-            Paper(law),
-            0.0,
-            rest,
-            rest,
-            start,
-            1e-13,
-            1e-15,
-            0.9,
-            0.0,
-            0.333,
-            6.0,
-            rest,
-            0.0,
-            100_000,
-            1_000,
-            OutputType::Sparse,
-        );
-        integrator.integrate().expect("the arc is smooth");
-        let end = integrator.y_out().last().expect("has an end");
-        assert!(relative(end[0], 1.0 / v_f) < 1e-7, "{transition:?} {t_f}: theta ends at {}", end[0]);
-        let work = held + end[2];
+        let (theta, work) = integrated(&transition, t_f, &found);
+        assert!(relative(theta, 1.0 / transition.v_f) < 1e-7, "{transition:?} {t_f}: theta ends at {theta}");
         assert!(relative(work, found.work) < 1e-8, "{transition:?} {t_f}: {work} against {}", found.work);
+    }
+}
+
+/// The end of theta and the work of the paper's equations, integrated from the start of an optimum.
+fn integrated(transition: &Transition, t_f: f64, found: &Optimum) -> (f64, f64) {
+    let &Transition { law, v_i, .. } = transition;
+    // The hold in closed form for theta, by quadrature in steps of the integrator for its work.
+    let theta_c =
+        if found.time_at_floor > 0.0 { 1.0 - (1.0 - 1.0 / v_i) * (-found.time_at_floor).exp() } else { 1.0 / v_i };
+    let tau = |v: f64, theta: f64| 1.0 + law.a * v.ln() + law.b * theta.ln();
+    let steps = 20_000;
+    let h = found.time_at_floor / f64::from(steps);
+    let held: f64 = (0..steps).map(|i| tau(1.0, 1.0 - (1.0 - 1.0 / v_i) * (-(f64::from(i) + 0.5) * h).exp()) * h).sum();
+    let beta = -(law.a + tau(found.v_start, theta_c)) / theta_c;
+    let start = SVector::<f64, 3>::new(theta_c, beta, 0.0);
+    let rest = t_f - found.time_at_floor;
+    // Defaults but for the output: accepted steps only, the last of which is the end.
+    let mut integrator = Dop853::from_param(
+        Paper(law),
+        0.0,
+        rest,
+        rest,
+        start,
+        1e-13,
+        1e-15,
+        0.9,
+        0.0,
+        0.333,
+        6.0,
+        rest,
+        0.0,
+        100_000,
+        1_000,
+        OutputType::Sparse,
+    );
+    integrator.integrate().expect("the arc is smooth");
+    let end = integrator.y_out().last().expect("has an end");
+    (end[0], held + end[2])
+}
+
+/// The nodes were too few on short arcs where friction falls far below `b - a`: theta missed its end by up to 4 % of the way.
+#[test]
+fn regress_short_arcs_of_low_friction_arrive() {
+    for (a, b, v_i, v_f, t_f) in [
+        (0.1787, 0.5, 62.94885, 62.94835, 2.965e-5),
+        (0.03, 0.2, 1e3, 999.0, 1e-5),
+        (0.1, 0.2, 1e9, 9.9999e8, 1e-12),
+        (0.03, 0.5, 1e6, 9.99e5, 3e-9),
+        (0.25, 0.5, 1e9, 9.99e8, 1e-11),
+        (0.25, 0.5, 1e9, 1.00001e9, 1e-12),
+    ] {
+        let transition = Transition { law: Law { a, b }, v_i, v_f };
+        let found = solve(&transition, t_f, true, 1e-10).value.expect("exists");
+        let (theta, work) = integrated(&transition, t_f, &found);
+        let miss = (theta - 1.0 / v_f) / (1.0 / v_f - 1.0 / v_i);
+        assert!(miss.abs() < 1e-7, "{transition:?} {t_f}: misses by {miss}");
+        assert!(relative(work, found.work) < 1e-9, "{transition:?} {t_f}: {work} against {}", found.work);
     }
 }
 

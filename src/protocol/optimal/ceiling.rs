@@ -6,9 +6,8 @@
 use multiversion::multiversion;
 
 use super::clamp::{Depth, Gap};
-use super::lifetime::Lifetime;
 use super::{ArcKind, Bounds};
-use crate::model::Law;
+use crate::model::{Law, friction_margin};
 use crate::numerics::elementary::{exp, exp_and_m1, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::{Rule, rule};
 use crate::numerics::lanes::{LANES, fold};
@@ -30,15 +29,15 @@ pub(super) struct Ceilings {
 }
 
 impl Ceilings {
-    /// The ceilings over the lifetime `to` of steady sliding at `v_f`. Only differences to the ceilings enter.
-    pub fn new(law: Law, to: Lifetime, v_f: f64, bounds: &Bounds) -> Ceilings {
+    /// The ceilings over the lifetime of steady sliding at `v_f`. Only differences to the ceilings enter.
+    pub fn new(law: Law, v_f: f64, bounds: &Bounds) -> Ceilings {
         let &Bounds { v_ceiling: v, tau_ceiling: tau, .. } = bounds;
         Ceilings {
             law,
             v,
             tau,
             z_v: ln_ratio(v, v - v_f, v_f),
-            z_tau: ((tau - 1.0) - (law.b - law.a) * to.ln) / law.a,
+            z_tau: friction_margin(law, tau, v_f) / law.a,
             kappa: (law.a - law.b) / law.a,
         }
     }

@@ -236,7 +236,7 @@ pub fn slopes(
 fn posed(transition: &Transition, t_f: f64, bounds: &Bounds) -> Option<(Problem, Ceilings)> {
     let problem = Problem::of(transition, bounds.floor)?;
     let inside = t_f > 0.0 && t_f.is_finite() && bounds.is_valid();
-    inside.then(|| (problem, Ceilings::new(transition.law, problem.to, transition.v_f, bounds)))
+    inside.then(|| (problem, Ceilings::new(transition.law, transition.v_f, bounds)))
 }
 
 /// The optimal protocol and its motion.

@@ -23,19 +23,17 @@
 //! In a standstill, theta does not depend on either end. There both ends are integrated to a point in the standstill,
 //! and the slip of both is compared with the spare time.
 
-mod friction_margin;
 mod motion;
 mod panel;
 mod path;
 mod work_and_velocity;
 
 use super::{Case, Family, Obstacle, Shortcut};
-use crate::model::Transition;
+use crate::model::{Transition, friction_margin};
 use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Motion, SolverStats};
-use friction_margin::friction_margin;
 use motion::BoundedFrictionMotion;
 use panel::FrictionPanel;
 use path::{FrictionPath, PassFailure, PassResult, Residual, WorkTolerance};

@@ -1,6 +1,6 @@
-//! The margin of steady friction below its bound, `tau_M - 1 - (a - b) ln v`, with full relative accuracy.
+//! The margin of steady friction below a ceiling, `tau_M - 1 - (a - b) ln v`, with full relative accuracy.
 
-use crate::model::Law;
+use super::Law;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 
@@ -10,9 +10,12 @@ const LN_2_REST: f64 = 2.3190468138462996e-17;
 /// Margin, fraction of its terms, below which it is formed in double-double. Chosen: one digit is lost there.
 const CANCELLATION: f64 = 0.1;
 
-/// Margin of steady sliding at `v >= 1`, in `mu_0 sigma`.
-pub(super) fn friction_margin(law: Law, tau_ceiling: f64, v: f64) -> f64 {
+/// Margin of steady sliding at `v > 0`, in `mu_0 sigma`; infinite without a ceiling.
+pub fn friction_margin(law: Law, tau_ceiling: f64, v: f64) -> f64 {
     let scale = tau_ceiling - 1.0;
+    if scale == f64::INFINITY {
+        return scale;
+    }
     let plain = scale - (law.a - law.b) * ln(v);
     if plain.abs() > CANCELLATION * scale.abs().max(1.0) {
         return plain;
