@@ -27,6 +27,9 @@ fn compare(
     if !exists {
         return columns.iter().for_each(|column| verdict.compare(row, column, None, None));
     }
+    if number(row, time).is_none() && word(row, STATUS) == Some(NEGATIVE) {
+        return verdict.miss("a time at which friction may be too low for a proof");
+    }
     columns.iter().for_each(|column| verdict.demand(row, column, true));
     let Some(t) = number(row, time).filter(|t| *t > 0.0) else {
         return verdict.miss("a work at a time that was not written");
@@ -79,8 +82,9 @@ pub fn check(row: &Row, context: &Context) -> Checked {
     if !accelerates {
         let t_min = min_duration(&problem, true);
         verdict.compare(row, "t_min", bounded.then_some(t_min), (t_min == 0.0).then_some(1.0));
-        let slope = |y: &[f64; 2]| [1.0 - y[0], 1.0 + b * y[0].ln()];
-        let work = integrate(slope, [1.0 / v_i, 0.0], (0.0, t_min)).map(|y| y[1]);
+        // Theta in units of its start, and the time and the work in units of t_min.
+        let slope = |y: &[f64; 2]| [t_min * (v_i - y[0]), tau_floor + b * y[0].ln()];
+        let work = integrate(slope, [1.0, 0.0], (0.0, 1.0)).map(|y| t_min * y[1]);
         verdict.compare(row, "work_at_t_min", work.filter(|_| bounded), (t_min == 0.0).then_some(1.0));
     }
     Ok(verdict)

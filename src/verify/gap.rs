@@ -67,15 +67,26 @@ pub struct Cubic {
     law: Law,
     form: Friction,
     t_f: f64,
-    /// Coefficients of theta.
-    theta: [f64; 4],
+    /// Coefficients of theta, by the distance from the start and from the end.
+    theta: [[f64; 4]; 2],
+}
+
+/// A place on the path: whether it is nearer to the end, and the distance from the nearer one, in units of `t_f`.
+pub type Place = (bool, f64);
+
+/// The place at `x`.
+pub fn place(x: f64) -> Place {
+    if x <= 0.5 { (false, x) } else { (true, 1.0 - x) }
 }
 
 impl Cubic {
     pub fn new(problem: &Transition, t_f: f64, a_2: f64, a_3: f64) -> Cubic {
         let (theta_0, theta_1) = (1.0 / problem.v_i, 1.0 / problem.v_f);
         let (state, form) = (StateLaw::Ageing, Friction::Log);
-        Cubic { state, form, law: problem.law, t_f, theta: [theta_0, a_2, a_3, theta_1 - theta_0 - a_2 - a_3] }
+        let change = theta_1 - theta_0;
+        let from_start = [theta_0, a_2, a_3, change - a_2 - a_3];
+        let from_end = [theta_1, 2.0 * a_2 + a_3 - 3.0 * change, 3.0 * (change - a_2) - 2.0 * a_3, a_2 + a_3 - change];
+        Cubic { state, form, law: problem.law, t_f, theta: [from_start, from_end] }
     }
 
     /// This cubic under an evolution law of the state.
@@ -83,24 +94,25 @@ impl Cubic {
         Cubic { state, ..self }
     }
 
-    pub fn theta(&self, x: f64) -> f64 {
-        let [c_0, c_1, c_2, c_3] = self.theta;
+    fn theta(&self, (from_end, x): Place) -> f64 {
+        let [c_0, c_1, c_2, c_3] = self.theta[usize::from(from_end)];
         c_0 + x * (c_1 + x * (c_2 + x * c_3))
     }
 
-    fn rate(&self, x: f64) -> f64 {
-        let [_, c_1, c_2, c_3] = self.theta;
-        (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f
+    fn rate(&self, (from_end, x): Place) -> f64 {
+        let [_, c_1, c_2, c_3] = self.theta[usize::from(from_end)];
+        let rate = (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f;
+        if from_end { -rate } else { rate }
     }
 
-    pub fn velocity(&self, x: f64) -> f64 {
-        let rate = self.rate(x);
+    pub fn velocity(&self, at: Place) -> f64 {
+        let rate = self.rate(at);
         let u = match self.state {
             StateLaw::Ageing => 1.0 - rate,
             StateLaw::Slip => product_of_slip(rate),
             StateLaw::Prz => (1.0 - 2.0 * rate).sqrt(),
         };
-        u / self.theta(x)
+        u / self.theta(at)
     }
 
     /// The least value of theta and of the distance of `theta'` from its bound; not positive if there is no such shortcut.
@@ -110,27 +122,30 @@ impl Cubic {
             StateLaw::Slip => (-1.0_f64).exp(),
             StateLaw::Prz => 0.5,
         };
-        lowest(&|x| self.theta(x).min(bound - self.rate(x)))
+        lowest(&|at| self.theta(at).min(bound - self.rate(at)))
     }
 
     pub fn v_min(&self) -> f64 {
-        lowest(&|x| self.velocity(x))
+        lowest(&|at| self.velocity(at))
     }
 
-    fn friction(&self, x: f64) -> f64 {
+    fn friction(&self, at: Place) -> f64 {
         match self.form {
-            Friction::Log => 1.0 + self.law.a * self.velocity(x).ln() + self.law.b * self.theta(x).ln(),
-            Friction::Regularised => arcsinh::tau(&self.law, self.velocity(x), self.theta(x)),
+            Friction::Log => 1.0 + self.law.a * self.velocity(at).ln() + self.law.b * self.theta(at).ln(),
+            Friction::Regularised => arcsinh::tau(&self.law, self.velocity(at), self.theta(at)),
         }
     }
 
     pub fn friction_min(&self) -> f64 {
-        lowest(&|x| self.friction(x))
+        lowest(&|at| self.friction(at))
     }
 
     pub fn work(&self) -> Option<f64> {
-        let slope = |y: &[f64; 2]| [self.t_f * self.velocity(y[1]) * self.friction(y[1]), 1.0];
-        integrate(slope, [0.0, 0.0], (0.0, 1.0)).map(|y| y[0])
+        let half = |from_end: bool| {
+            let power = |at: Place| self.t_f * self.velocity(at) * self.friction(at);
+            integrate(|y: &[f64; 2]| [power((from_end, y[1])), 1.0], [0.0, 0.0], (0.0, 0.5)).map(|y| y[0])
+        };
+        Some(half(false)? + half(true)?)
     }
 }
 
@@ -139,7 +154,7 @@ fn product_of_slip(rate: f64) -> f64 {
     bisect(-1.0, 700.0, |ln_u| -ln_u * ln_u.exp() > rate).exp()
 }
 
-/// The least value on `[0, 1]`.
-fn lowest(f: &dyn Fn(f64) -> f64) -> f64 {
-    motion::lowest(f, (0.0, 1.0), SCAN_POINTS)
+/// The least value along a path.
+fn lowest(f: &dyn Fn(Place) -> f64) -> f64 {
+    motion::lowest(&|x| f(place(x)), (0.0, 1.0), SCAN_POINTS)
 }

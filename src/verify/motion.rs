@@ -13,8 +13,8 @@ pub struct Followed {
     motion: Box<dyn Motion>,
     /// Parameters and moments, in the order of time.
     pub samples: Vec<(f64, Moment)>,
-    /// The time that each moment stands for in an integral.
-    weights: Vec<f64>,
+    /// The time that each moment stands for in an integral, and the time whose rounding it carries.
+    weights: Vec<[f64; 2]>,
     /// `int tau v dt`.
     pub work: f64,
     /// Greatest relative error of friction, and of theta as `int G(theta v) dt` over an interval.
@@ -40,6 +40,10 @@ const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Relative error of theta above which an interval may be split. Chosen: a hundredth of the default `rtol`.
 const RESOLVED_RTOL: f64 = 1e-12;
 
+/// Relative difference between the works by one rule over an interval and by the rules of its halves, above which it may be split. Derived: rules of
+/// sixteen nodes converge geometrically, and half the interval squares the ratio; the halves are then good to rounding.
+const RESOLVED_WORK_RTOL: f64 = 1e-9;
+
 /// Change of theta, relative to itself, whose error counts. Chosen: its rounding is then below the default `rtol`.
 const LEAST_CHANGE: f64 = 1e-3;
 
@@ -49,21 +53,32 @@ struct Half {
     places: Nodes,
     at: [Moment; NODES],
     times: Nodes,
-    /// Derivative of the time by the part of the half.
-    dt: Nodes,
+    /// Derivative of the time by the part of the half: of the time itself, and by the evolution of theta where that is rounded less.
+    dt: [Nodes; 2],
+    /// The time whose rounding is in the latter.
+    rounded: f64,
 }
 
 impl Half {
-    fn new(motion: &dyn Motion, [from, to]: [f64; 2]) -> Half {
+    fn new(motion: &dyn Motion, state_law: StateLaw, [from, to]: [f64; 2]) -> Half {
         let (rule, start) = (radau(), motion.at(from));
         let places = rule.u.map(|u| from * (1.0 - u) + to * u);
         let at = places.map(|s| motion.at(s));
         let times = at.map(|moment| moment.t - start.t);
-        Half { start, places, at, times, dt: rule.slopes(&times) }
+        let slopes = rule.slopes(&times);
+        let rates = at.map(|moment| state_law.rate(moment.theta * moment.v));
+        let clock = at.iter().zip(&rates).map(|(at, rate)| at.theta / rate.abs()).fold(0.0, f64::max);
+        let late = at[NODES - 1].t;
+        if clock.is_nan() || clock >= late {
+            return Half { start, places, at, times, dt: [slopes, slopes], rounded: late };
+        }
+        let mut by_theta = rule.slopes(&at.map(|moment| moment.theta - start.theta));
+        by_theta.iter_mut().zip(&rates).for_each(|(change, rate)| *change /= rate);
+        Half { start, places, at, times, dt: [slopes, by_theta], rounded: clock }
     }
 
-    fn integral(&self, f: &dyn Fn(&Moment) -> f64) -> f64 {
-        self.at.iter().zip(&self.dt).zip(&radau().w).map(|((at, dt), w)| w * f(at) * dt).sum()
+    fn integral(&self, dt: &Nodes, f: &dyn Fn(&Moment) -> f64) -> f64 {
+        self.at.iter().zip(dt).zip(&radau().w).map(|((at, dt), w)| w * f(at) * dt).sum()
     }
 }
 
@@ -81,7 +96,7 @@ impl Followed {
             slider: *slider,
             motion,
             samples: vec![(0.0, first)],
-            weights: vec![0.0],
+            weights: vec![[0.0; 2]],
             work: 0.0,
             equation: 0.0,
             changes: [0.0; 3],
@@ -106,13 +121,14 @@ impl Followed {
         if after.t == before.t {
             return 0.0;
         }
-        let halves = [[from, middle], [middle, to]].map(|ends| Half::new(&*self.motion, ends));
-        let growth: f64 = halves.iter().map(|half| half.integral(&|at| state_law.rate(at.theta * at.v))).sum();
+        let halves = [[from, middle], [middle, to]].map(|ends| Half::new(&*self.motion, state_law, ends));
+        let evolved = |half: &Half| half.integral(&half.dt[0], &|at| state_law.rate(at.theta * at.v));
+        let growth: f64 = halves.iter().map(evolved).sum();
         let rounding = |at: &Moment| TIME_ROUNDING * (at.t * (1.0 / at.theta).max(at.v) + 1.0);
         let noise = halves.iter().flat_map(|half| &half.at).map(rounding).fold(0.0, f64::max);
         let change = after.theta - before.theta;
         let error = ((change - growth) / after.theta).abs() - noise;
-        if error > RESOLVED_RTOL && splits > 0 {
+        if splits > 0 && (error > RESOLVED_RTOL || !self.resolves_work([from, to], &halves)) {
             return self.interval([from, middle], splits - 1) + self.interval([middle, to], splits - 1);
         }
         let changes = [change.abs(), growth.abs(), noise * after.theta];
@@ -121,10 +137,20 @@ impl Followed {
         error.max(0.0)
     }
 
+    /// Whether one rule over the interval and the rules of its halves give the same work.
+    fn resolves_work(&self, ends: [f64; 2], halves: &[Half]) -> bool {
+        let power = |at: &Moment| at.friction * at.v;
+        let work = |half: &Half| half.integral(&half.dt[1], &power);
+        let whole = Half::new(&*self.motion, self.state_law, ends);
+        let size = whole.integral(&whole.dt[1], &|at| power(at).abs()).abs();
+        let rounding = whole.at.iter().map(|at| TIME_ROUNDING * whole.rounded * power(at).abs()).fold(0.0, f64::max);
+        (halves.iter().map(work).sum::<f64>() - work(&whole)).abs() <= RESOLVED_WORK_RTOL * size + rounding
+    }
+
     /// Adds half of an interval.
     fn add(&mut self, half: &Half) {
         let SpringBlock { law: Law { a, b }, k, m } = self.slider;
-        let Half { start, places, at, times, dt } = half;
+        let Half { start, places, at, times, dt: [slopes, dt], rounded } = half;
         // Below the normal numbers a velocity has no logarithm.
         for Moment { v, theta, friction, .. } in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
             let error = (1.0 + a * v.ln() + b * theta.ln() - friction).abs() / (1.0 + friction.abs());
@@ -133,17 +159,17 @@ impl Followed {
         if k.is_finite() {
             let speeds = at.map(|moment| moment.v - start.v);
             let last = at.len() - 1;
-            let force = at[last].friction + m * radau().slopes(&speeds)[last] / dt[last];
+            let force = at[last].friction + m * radau().slopes(&speeds)[last] / slopes[last];
             let extension = |at: &Moment| k * (at.v_c.unwrap_or(at.v) - at.v);
-            self.passed += half.integral(&extension);
-            self.reach += half.integral(&|at| extension(at).abs()).abs() / a;
+            self.passed += half.integral(slopes, &extension);
+            self.reach += half.integral(slopes, &|at| extension(at).abs()).abs() / a;
             self.force = self.force.max(force.abs() / a);
             let off = (force - self.samples[0].1.friction - self.passed).abs();
             let lack = off - SLOPE_ROUNDING * m * at[last].v / times[last];
             self.control = self.control.max(lack / (a * (1.0 + self.reach)));
         }
         self.samples.extend(places.iter().copied().zip(*at));
-        self.weights.extend(dt.iter().zip(&radau().w).map(|(dt, w)| dt * w));
+        self.weights.extend(dt.iter().zip(&radau().w).map(|(dt, w)| [dt * w, *rounded]));
     }
 
     /// Relative error of the sum of all changes of theta without sign.
@@ -160,7 +186,13 @@ impl Followed {
     /// The integral of a function of the moment before and the moment over time. The moment before lies on the same arc, also at the end of one.
     pub fn integral_along(&self, f: impl Fn(&Moment, &Moment) -> f64) -> f64 {
         let pairs = self.samples.windows(2).zip(&self.weights[1..]);
-        pairs.map(|(pair, dt)| f(&pair[0].1, &pair[1].1) * dt).sum()
+        pairs.map(|(pair, [dt, _])| f(&pair[0].1, &pair[1].1) * dt).sum()
+    }
+
+    /// The effect of the rounding of times on the integral of a function of the moment.
+    pub fn rounding(&self, f: impl Fn(&Moment) -> f64) -> f64 {
+        let errors = self.samples.iter().zip(&self.weights).map(|((_, at), [_, rounded])| rounded * f(at).abs());
+        f64::EPSILON * errors.fold(0.0, f64::max)
     }
 
     /// The moment at a parameter.

@@ -158,7 +158,7 @@ impl Optimum {
         let by_tau = |before: &Moment, at: &Moment| multiplier(before, at, ArcKind::TauCeiling) * at.v / a;
         let by_law = |before: &Moment, at: &Moment| at.v + by_tau(before, at);
         let summed = |column, f: &dyn Fn(&Moment, &Moment) -> f64| {
-            (column, self.motion.integral_along(f), self.rounding(|at| f(at, at)))
+            (column, self.motion.integral_along(f), self.motion.rounding(|at| f(at, at)))
         };
         let [start, end] = [self.start, self.end].map(|at| at.beta.unwrap_or(f64::NAN));
         let (from, to) = (self.task.from(), 1.0 / self.task.problem.v_f);
@@ -170,11 +170,6 @@ impl Optimum {
             summed("dwork_dv_ceiling", &|before, at| -multiplier(before, at, ArcKind::VCeiling)),
             summed("dwork_dtau_ceiling", &|before, at| -by_tau(before, at)),
         ]
-    }
-
-    /// The effect of the rounding of times on the integral of a function of the moment.
-    fn rounding(&self, f: impl Fn(&Moment) -> f64) -> f64 {
-        f64::EPSILON * self.task.t_f * self.motion.samples.iter().map(|(_, at)| f(at).abs()).fold(0.0, f64::max)
     }
 
     /// Compares the numbers of a row of this optimum.
@@ -210,8 +205,9 @@ impl Optimum {
         verdict.compare(row, "friction_max", Some(self.motion.greatest(|at| at.friction)), None);
         verdict.friction(row, self.motion.least(|at| at.friction));
         if let (Some(work), Some(error)) = (number(row, "work"), number(row, "work_error")) {
-            let noise =
-                self.rounding(|at| at.friction * at.v) + (near.work - self.work).abs() + 0.1 * rtol * self.work.abs();
+            let noise = self.motion.rounding(|at| at.friction * at.v)
+                + (near.work - self.work).abs()
+                + 0.1 * rtol * self.work.abs();
             verdict.judge("work_error", (work - self.work).abs() <= error + noise, "a bound");
         }
         if !row.iter().any(|(column, _)| column.starts_with("dwork")) {

@@ -1,6 +1,6 @@
 //! `shortcut`: the traced member obeys the equations and the formula of its family, and arrives.
 
-use super::gap::Cubic;
+use super::gap::{Cubic, place};
 use super::motion::Followed;
 use super::route::integrate;
 use super::task::{Task, min_duration};
@@ -70,7 +70,7 @@ fn formula(verdict: &mut Verdict, row: &Row, case: &Case, name: &str, followed: 
             // Theta and its slope are differences of numbers of the size of the greatest, and of that over the time.
             let noise =
                 |at: &Moment| 16.0 * f64::EPSILON / v_i.min(v_f) * (1.0 / at.theta + 1.0 / (t_f * at.theta * at.v));
-            return greatest(&|at| ((at.v / cubic.velocity(at.t / t_f) - 1.0).abs() - noise(at)).max(0.0));
+            return greatest(&|at| ((at.v / cubic.velocity(place(at.t / t_f)) - 1.0).abs() - noise(at)).max(0.0));
         }
         "bounded_velocity" => (&|at| (at.v - 1.0, at.v), -t_f * t_f),
         // A parabola, for which alpha is 0.

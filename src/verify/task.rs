@@ -3,7 +3,7 @@
 use super::route::integrate;
 use super::verdict::{Verdict, number, word};
 use crate::dataset::Row;
-use crate::model::{Law, Transition};
+use crate::model::{Transition, friction_margin};
 use crate::protocol::optimal::{Bounds, Optimum};
 use crate::protocol::{Motion, Solved, optimal};
 use crate::table::STATUS;
@@ -31,6 +31,9 @@ const STEADY_NOISE: f64 = 2e-14;
 /// Relative accuracy of the motions. Chosen: a hundredth of the default `rtol`.
 const MOTION_RTOL: f64 = 1e-12;
 
+/// Time in units of its largest slope, below which it is integrated again in its own unit. Derived: the absolute tolerance of 1e-15 is then 1e-12.
+const SMALL_TIME: f64 = 1e-3;
+
 impl Task {
     /// The transition between steady sliding.
     pub fn new(problem: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Task {
@@ -56,71 +59,79 @@ impl Task {
         1.0 / self.problem.v_f
     }
 
-    /// `ln theta` at both ends.
-    fn ends(&self) -> [f64; 2] {
-        [self.from().ln(), self.to().ln()]
+    /// The velocity of steady sliding at the start and at the end.
+    fn steady(&self) -> [f64; 2] {
+        [self.theta.map_or(self.problem.v_i, |theta| 1.0 / theta), self.problem.v_f]
     }
 
-    fn steady_friction(&self, l: f64) -> f64 {
-        let Law { a, b } = self.problem.law;
-        1.0 + (b - a) * l
+    /// `ln` of theta at the end over that at the start.
+    fn way(&self) -> f64 {
+        let [before, after] = self.steady();
+        ln_ratio(before, after)
     }
 
-    /// `ln(theta v)` on the ceilings of velocity and friction at `ln theta = l`.
-    fn caps(&self, l: f64) -> [f64; 2] {
-        let (v_f, Bounds { v_ceiling, tau_ceiling, .. }) = (self.problem.v_f, self.bounds);
-        let at_end = ((v_ceiling - v_f) / v_f).ln_1p();
-        [at_end + (l - self.ends()[1]), (tau_ceiling - self.steady_friction(l)) / self.problem.law.a]
+    /// `ln(theta v)` on the ceilings of velocity and friction, at a part of the way of `ln theta`.
+    fn caps(&self, part: f64) -> [f64; 2] {
+        let (law, Bounds { v_ceiling, tau_ceiling, .. }) = (self.problem.law, self.bounds);
+        let nearer = usize::from(part > 0.5);
+        let v = self.steady()[nearer];
+        let y = (part - [0.0, 1.0][nearer]) * self.way();
+        [ln_ratio(v_ceiling, v) + y, (friction_margin(law, tau_ceiling, v) + (law.a - law.b) * y) / law.a]
     }
 
-    fn cap(&self, l: f64) -> f64 {
-        let [v, tau] = self.caps(l);
+    fn cap(&self, part: f64) -> f64 {
+        let [v, tau] = self.caps(part);
         v.min(tau)
     }
 
     /// Whether the ceilings allow steady sliding at the end, and nothing above its theta.
     pub fn sits(&self) -> bool {
-        self.to() >= self.from() && self.cap(self.ends()[1]) == 0.0
+        self.to() >= self.from() && self.cap(1.0) == 0.0
     }
 
-    /// `ln theta` between the ends at which the ceilings cross: both are linear in it.
+    /// The part of the way between the ends at which the ceilings cross: both are linear in it.
     fn crossing(&self) -> Option<f64> {
-        let [start, end] = self.ends();
-        let [before, after] = [start, end].map(|l| self.caps(l)).map(|[v, tau]| v - tau);
-        (before * after < 0.0).then(|| start + (end - start) * before / (before - after))
+        let [before, after] = [0.0, 1.0].map(|part| self.caps(part)).map(|[v, tau]| v - tau);
+        (before * after < 0.0).then(|| before / (before - after))
     }
 
     /// Time on the ceilings from one end to the other.
     fn time_on_ceilings(&self) -> Option<f64> {
-        let [start, end] = self.ends();
-        let rate = |l: f64| -l.exp() / self.cap(l).exp_m1();
-        // About the time itself: below its absolute tolerance the integrator has no digits.
-        let unit = (end - start).abs() * rate(start).abs().max(rate(end).abs());
-        let slope = |y: &[f64; 2]| [1.0, rate(y[0]) / unit];
-        let middle = self.crossing().unwrap_or(end);
-        let time = integrate(slope, [start, 0.0], (start, middle))?[1];
-        Some(unit * integrate(slope, [middle, time], (middle, end))?[1])
+        let way = self.way();
+        let rate = |part: f64| -way * self.from() * (part * way).exp() / self.cap(part).exp_m1();
+        // The rate has a kink where the ceilings cross, and rounding makes it jump where the nearer end changes.
+        let across = self.crossing().unwrap_or(1.0);
+        let edges = [0.0, across.min(0.5), across.max(0.5), 1.0];
+        let time = |unit: f64| {
+            let slope = |y: &[f64; 2]| [1.0, rate(y[0]) / unit];
+            let part = |time, ends: &[f64]| Some(integrate(slope, [ends[0], time], (ends[0], ends[1]))?[1]);
+            Some(unit * edges.windows(2).try_fold(0.0, part)?)
+        };
+        // In units of its largest slope the time may be so small that the absolute tolerance of the integrator leaves too few digits.
+        let steepest = rate(0.0).abs().max(rate(1.0).abs());
+        let first = time(steepest)?;
+        if first.abs() > SMALL_TIME * steepest { Some(first) } else { time(first) }
     }
 
     /// The least and the greatest feasible time; `None` where rounding decides.
     fn limits(&self) -> Option<Limits> {
-        let (ends, (from, to)) = (self.ends(), (self.from(), self.to()));
+        let (from, to) = (self.from(), self.to());
         let Bounds { floor, v_ceiling, tau_ceiling } = self.bounds;
-        let rooms = ends.map(|l| (tau_ceiling - self.steady_friction(l)).abs());
+        let rooms = self.steady().map(|v| friction_margin(self.problem.law, tau_ceiling, v).abs());
         if rooms.iter().any(|room| *room > 0.0 && *room < STEADY_NOISE) {
             return None;
         }
-        let [at_start, at_end] = ends.map(|l| self.cap(l));
+        let [at_start, at_end] = [0.0, 1.0].map(|part| self.cap(part));
         if to <= from {
-            let (cap, l) = if at_end <= at_start { (at_end, ends[1]) } else { (at_start, ends[0]) };
+            let (cap, part) = if at_end <= at_start { (at_end, 1.0) } else { (at_start, 0.0) };
             if cap < 0.0 || (cap == 0.0 && to < from) {
-                let [v, tau] = self.caps(l);
+                let [v, tau] = self.caps(part);
                 return Some(Err((v != tau).then_some(if v < tau { "v_ceiling" } else { "tau_ceiling" })));
             }
             return Some(Ok((if to < from { self.time_on_ceilings()? } else { 0.0 }, f64::INFINITY)));
         }
         let least = if floor {
-            let room = tau_ceiling - (1.0 + self.problem.law.b * ends[1]);
+            let room = tau_ceiling - (1.0 + self.problem.law.b * to.ln());
             match () {
                 () if v_ceiling < 1.0 => return Some(Err(Some("v_ceiling"))),
                 () if room.abs() < STEADY_NOISE => return None,
@@ -131,8 +142,8 @@ impl Task {
             to - from
         };
         // Above theta_1 theta can wait or turn; below it only where the ceilings allow steady sliding.
-        let allows = |l: f64| self.cap(l) > 0.0;
-        let waits = at_end >= 0.0 || allows(ends[0]) || self.crossing().is_some_and(allows);
+        let allows = |part: f64| self.cap(part) > 0.0;
+        let waits = at_end >= 0.0 || allows(0.0) || self.crossing().is_some_and(allows);
         Some(Ok((least, if waits { f64::INFINITY } else { self.time_on_ceilings()? })))
     }
 
@@ -142,10 +153,7 @@ impl Task {
             let least = min_duration(&self.problem, self.bounds.floor);
             return Some(if self.bounds.floor { self.t_f >= least } else { self.t_f > least });
         }
-        let [start, end] = self.ends();
-        // Rounding of both ends, relative to their distance.
-        let noise = if start == end { 0.0 } else { 4.0 * f64::EPSILON * (1.0 + end.abs()) / (end - start).abs() };
-        let clear = |room: f64| (room.abs() > (BORDER_RTOL + noise) * self.t_f).then_some(room > 0.0);
+        let clear = |room: f64| (room.abs() > BORDER_RTOL * self.t_f).then_some(room > 0.0);
         match self.limits()? {
             Err(_) => Some(false),
             Ok((least, most)) => Some(clear(self.t_f - least)? && clear(most - self.t_f)?),
@@ -187,6 +195,12 @@ impl Task {
             verdict.judge(column, below != Some(true) && above != Some(false), "least feasible");
         }
     }
+}
+
+/// `ln(x/y)`.
+fn ln_ratio(x: f64, y: f64) -> f64 {
+    let above = (x - y) / y;
+    if above.abs() < 0.5 { above.ln_1p() } else { (x / y).ln() }
 }
 
 /// Shortest duration: the time at `v = 1` with a floor, else at rest, from `1/v_i` to `1/v_f`; 0 for an acceleration.

@@ -24,20 +24,28 @@ pub(super) struct Ceilings {
     pub z_v: f64,
     /// `ln u` at `theta_1` on the ceiling of friction.
     pub z_tau: f64,
+    /// Both at `theta_0`, which is `theta_1 e^depth`: near it they keep more digits than from `theta_1`.
+    pub z_start: [f64; 2],
+    pub depth: f64,
     /// `1 - b/a`.
     pub kappa: f64,
 }
 
 impl Ceilings {
-    /// The ceilings over the lifetime of steady sliding at `v_f`. Only differences to the ceilings enter.
-    pub fn new(law: Law, v_f: f64, bounds: &Bounds) -> Ceilings {
+    /// The ceilings over the state variables of steady sliding at `v_0` and `v_1`, whose logarithms differ by `depth`. Only
+    /// differences to the ceilings enter.
+    pub fn new(law: Law, [v_0, v_1]: [f64; 2], depth: f64, bounds: &Bounds) -> Ceilings {
         let &Bounds { v_ceiling: v, tau_ceiling: tau, .. } = bounds;
+        let z_of_v = |steady: f64| ln_ratio(v, v - steady, steady);
+        let z_of_tau = |steady: f64| friction_margin(law, tau, steady) / law.a;
         Ceilings {
             law,
             v,
             tau,
-            z_v: ln_ratio(v, v - v_f, v_f),
-            z_tau: friction_margin(law, tau, v_f) / law.a,
+            z_v: z_of_v(v_1),
+            z_tau: z_of_tau(v_1),
+            z_start: [z_of_v(v_0), z_of_tau(v_0)],
+            depth,
             kappa: (law.a - law.b) / law.a,
         }
     }
@@ -45,17 +53,26 @@ impl Ceilings {
     /// No ceilings.
     pub fn none(law: Law) -> Ceilings {
         let none = f64::INFINITY;
-        Ceilings { law, v: none, tau: none, z_v: none, z_tau: none, kappa: (law.a - law.b) / law.a }
+        let kappa = (law.a - law.b) / law.a;
+        Ceilings { law, v: none, tau: none, z_v: none, z_tau: none, z_start: [none; 2], depth: 0.0, kappa }
     }
 
     /// The largest `ln u` at `y`.
     pub fn cap(&self, y: f64) -> f64 {
-        (self.z_v + y).min(self.z_tau + self.kappa * y)
+        let (y, [z_v, z_tau]) = self.nearer(y);
+        (z_v + y).min(z_tau + self.kappa * y)
+    }
+
+    /// The distance from the nearer end, and `ln u` on both ceilings there.
+    fn nearer(&self, y: f64) -> (f64, [f64; 2]) {
+        let above = y - self.depth;
+        if above.abs() < y.abs() { (above, self.z_start) } else { (y, [self.z_v, self.z_tau]) }
     }
 
     /// `ln u` on one of the ceilings.
     pub fn cap_of(&self, kind: ArcKind, y: f64) -> f64 {
-        if kind == ArcKind::VCeiling { self.z_v + y } else { self.z_tau + self.kappa * y }
+        let (y, [z_v, z_tau]) = self.nearer(y);
+        if kind == ArcKind::VCeiling { z_v + y } else { z_tau + self.kappa * y }
     }
 
     /// Below this `y` the velocity binds before friction.

@@ -459,8 +459,8 @@ pub(super) fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Ex
         excess,
         friction: 1.0 + (law.b - law.a) * ln_theta_top,
         depth,
-        z_v: ceilings.z_v + depth,
-        z_tau: ceilings.z_tau + ceilings.kappa * depth,
+        z_v: ceilings.cap_of(ArcKind::VCeiling, depth),
+        z_tau: ceilings.cap_of(ArcKind::TauCeiling, depth),
         kappa: ceilings.kappa,
     })
 }
@@ -645,7 +645,7 @@ mod tests {
                             Bounds { floor, v_ceiling: times * v_f, tau_ceiling: steady(v_i).max(steady(v_f)) + above };
                         let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
                         let problem = Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded: floor };
-                        let ceilings = Ceilings::new(law, v_f, &bounds);
+                        let ceilings = Ceilings::new(law, [v_i, v_f], ln_1p(problem.fall), &bounds);
                         let q_floor = problem.q_floor();
                         for i in -30..=30 {
                             let q = 0.2501 * f64::from(i);

@@ -57,13 +57,14 @@ fn lowest_tau(problem: &Problem) -> f64 {
 /// The least ceiling of the velocity that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
 pub fn least_v_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Option<f64> {
     let (problem, ceilings) = posed(transition, t_f, &bounds.into().with_v_ceiling(f64::INFINITY))?;
-    let v_f = transition.v_f;
+    let &Transition { v_i, v_f, .. } = transition;
     let lowest = lowest_v(&problem, transition);
     let at = |place: f64| {
         let distance = exp(place);
         let v = lowest + distance;
-        let above = if lowest == v_f { distance } else { v - v_f };
-        (v, Ceilings { v, z_v: ln_ratio(v, above, v_f), ..ceilings })
+        let z = |steady: f64| ln_ratio(v, (lowest - steady) + distance, steady);
+        let z_start = [z(v_i), ceilings.z_start[1]];
+        (v, Ceilings { v, z_v: z(v_f), z_start, ..ceilings })
     };
     least(&problem, t_f, &ceilings, v_f, || root(&problem, t_f, [0.0, 1.0], rtol, at))
 }
@@ -71,19 +72,24 @@ pub fn least_v_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Boun
 /// The least ceiling of friction that allows `t_f`, with the other bounds as they are; `None` where no ceiling does.
 pub fn least_tau_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Option<f64> {
     let (problem, ceilings) = posed(transition, t_f, &bounds.into().with_tau_ceiling(f64::INFINITY))?;
-    let (a, end) = (problem.law.a, problem.friction_end());
+    let (a, start, end) = (problem.law.a, problem.friction_start(), problem.friction_end());
     let lowest = lowest_tau(&problem);
     let steady = problem.friction_start().max(end);
     let least = |root: &dyn Fn() -> f64| least(&problem, t_f, &ceilings, steady, root);
     if lowest.is_finite() {
         let at = |place: f64| {
             let distance = exp(place);
-            (lowest + distance, Ceilings { tau: lowest + distance, z_tau: ((lowest - end) + distance) / a, ..ceilings })
+            let z = |steady: f64| ((lowest - steady) + distance) / a;
+            let z_start = [ceilings.z_start[0], z(start)];
+            (lowest + distance, Ceilings { tau: lowest + distance, z_tau: z(end), z_start, ..ceilings })
         };
         return least(&|| root(&problem, t_f, [ln(a), 1.0], rtol, at));
     }
     // Without the floor nothing bounds it from below.
-    let at = |z_tau: f64| (end + a * z_tau, Ceilings { tau: end + a * z_tau, z_tau, ..ceilings });
+    let at = |z_tau: f64| {
+        let z_start = [ceilings.z_start[0], z_tau + ceilings.kappa * ceilings.depth];
+        (end + a * z_tau, Ceilings { tau: end + a * z_tau, z_tau, z_start, ..ceilings })
+    };
     least(&|| root(&problem, t_f, [0.0, 1.0], rtol * (1.0 / a).min(1.0), at))
 }
 

@@ -231,15 +231,20 @@ impl Floor {
         self.costate(self.from.ln, self.from.rest, self.time)
     }
 
-    /// Length of its coordinate. `ln theta` changes over its first value at the start, and theta and the costate over 1 at
-    /// both ends: the logarithm of the time from either end, in these units, opens them.
+    /// Length of its coordinate: the logarithm of the time from either end, in the units of each, opens both.
     pub fn length(&self) -> f64 {
-        self.first() + ln_1p(0.5 * self.time)
+        self.first() + ln_1p(0.5 * self.time / self.units()[1])
     }
 
     /// Its coordinate in the middle of the floor arc.
     fn first(&self) -> f64 {
-        ln_1p(0.5 * self.time / self.from.theta)
+        ln_1p(0.5 * self.time / self.units()[0])
+    }
+
+    /// Times over which the motion changes at the start and at the end: `ln theta` changes over its first value, theta and the
+    /// costate over 1. Beyond the floor arc they would take the digits of the coordinate.
+    fn units(&self) -> [f64; 2] {
+        [self.from.theta, 1.0].map(|unit| unit.min(self.time))
     }
 
     /// The moment at `place`, from 0 at the start to 1 at the end.
@@ -247,10 +252,10 @@ impl Floor {
         let along = self.length() * place;
         // The time gone and the time left.
         let (gone, left) = if along < self.first() {
-            let gone = (self.from.theta * exp_m1(along)).min(0.5 * self.time);
+            let gone = (self.units()[0] * exp_m1(along)).min(0.5 * self.time);
             (gone, self.time - gone)
         } else {
-            let left = exp_m1(self.length() - along).clamp(0.0, 0.5 * self.time);
+            let left = (self.units()[1] * exp_m1(self.length() - along)).clamp(0.0, 0.5 * self.time);
             (self.time - left, left)
         };
         let now = self.from.aged(gone);
