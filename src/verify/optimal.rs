@@ -82,7 +82,8 @@ impl Task {
             let &Moment { v, theta, friction, beta, .. } = at;
             let (press, arc) = (friction + law.a, self.arc(at));
             if arc == ArcKind::Free {
-                conserved.push((law.a * v - press / theta, law.a * v + press.abs() / theta));
+                // Where friction is close to -a, its terms cancel.
+                conserved.push((law.a * v - press / theta, law.a * v + (1.0 + law.a + friction.abs()) / theta));
                 continue;
             }
             // Without a costate theta is steady.

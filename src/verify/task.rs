@@ -70,35 +70,40 @@ impl Task {
         ln_ratio(before, after)
     }
 
-    /// `ln(theta v)` on the ceilings of velocity and friction, at a part of the way of `ln theta`.
-    fn caps(&self, part: f64) -> [f64; 2] {
-        let (law, Bounds { v_ceiling, tau_ceiling, .. }) = (self.problem.law, self.bounds);
-        let nearer = usize::from(part > 0.5);
-        let v = self.steady()[nearer];
-        let y = (part - [0.0, 1.0][nearer]) * self.way();
-        [ln_ratio(v_ceiling, v) + y, (friction_margin(law, tau_ceiling, v) + (law.a - law.b) * y) / law.a]
+    /// `ln(theta v)` on the ceilings of velocity and friction, as a function of the part of the way of `ln theta`.
+    fn caps(&self) -> impl Fn(f64) -> [f64; 2] {
+        let (law, way, Bounds { v_ceiling, tau_ceiling, .. }) = (self.problem.law, self.way(), self.bounds);
+        let ends = self.steady().map(|v| [ln_ratio(v_ceiling, v), friction_margin(law, tau_ceiling, v) / law.a]);
+        move |part| {
+            let ([v, tau], y) = if part > 0.5 { (ends[1], (part - 1.0) * way) } else { (ends[0], part * way) };
+            [v + y, tau + (law.a - law.b) / law.a * y]
+        }
     }
 
-    fn cap(&self, part: f64) -> f64 {
-        let [v, tau] = self.caps(part);
-        v.min(tau)
+    /// The lower one.
+    fn cap(&self) -> impl Fn(f64) -> f64 {
+        let caps = self.caps();
+        move |part| {
+            let [v, tau] = caps(part);
+            v.min(tau)
+        }
     }
 
     /// Whether the ceilings allow steady sliding at the end, and nothing above its theta.
     pub fn sits(&self) -> bool {
-        self.to() >= self.from() && self.cap(1.0) == 0.0
+        self.to() >= self.from() && self.cap()(1.0) == 0.0
     }
 
     /// The part of the way between the ends at which the ceilings cross: both are linear in it.
     fn crossing(&self) -> Option<f64> {
-        let [before, after] = [0.0, 1.0].map(|part| self.caps(part)).map(|[v, tau]| v - tau);
+        let [before, after] = [0.0, 1.0].map(self.caps()).map(|[v, tau]| v - tau);
         (before * after < 0.0).then(|| before / (before - after))
     }
 
     /// Time on the ceilings from one end to the other.
     fn time_on_ceilings(&self) -> Option<f64> {
-        let way = self.way();
-        let rate = |part: f64| -way * self.from() * (part * way).exp() / self.cap(part).exp_m1();
+        let (way, cap) = (self.way(), self.cap());
+        let rate = |part: f64| -way * self.from() * (part * way).exp() / cap(part).exp_m1();
         // The rate has a kink where the ceilings cross, and rounding makes it jump where the nearer end changes.
         let across = self.crossing().unwrap_or(1.0);
         let edges = [0.0, across.min(0.5), across.max(0.5), 1.0];
@@ -121,11 +126,11 @@ impl Task {
         if rooms.iter().any(|room| *room > 0.0 && *room < STEADY_NOISE) {
             return None;
         }
-        let [at_start, at_end] = [0.0, 1.0].map(|part| self.cap(part));
+        let [at_start, at_end] = [0.0, 1.0].map(self.cap());
         if to <= from {
             let (cap, part) = if at_end <= at_start { (at_end, 1.0) } else { (at_start, 0.0) };
             if cap < 0.0 || (cap == 0.0 && to < from) {
-                let [v, tau] = self.caps(part);
+                let [v, tau] = self.caps()(part);
                 return Some(Err((v != tau).then_some(if v < tau { "v_ceiling" } else { "tau_ceiling" })));
             }
             return Some(Ok((if to < from { self.time_on_ceilings()? } else { 0.0 }, f64::INFINITY)));
@@ -142,7 +147,7 @@ impl Task {
             to - from
         };
         // Above theta_1 theta can wait or turn; below it only where the ceilings allow steady sliding.
-        let allows = |part: f64| self.cap(part) > 0.0;
+        let allows = |part: f64| self.cap()(part) > 0.0;
         let waits = at_end >= 0.0 || allows(0.0) || self.crossing().is_some_and(allows);
         Some(Ok((least, if waits { f64::INFINITY } else { self.time_on_ceilings()? })))
     }

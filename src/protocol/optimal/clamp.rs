@@ -451,7 +451,7 @@ pub(super) fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Ex
             (theta_h, ln_theta_h, 0.0, ln_1p(x_end * x_end))
         }
         Chart::Direct { y_end: 0.0, .. } => return None,
-        _ => (problem.from.theta, problem.from.ln, law.a * phi(extremal.start), ln_1p(problem.fall)),
+        _ => (problem.from.theta, problem.from.ln, law.a * phi(extremal.start), problem.depth()),
     };
     Some(Fall {
         law,
@@ -568,7 +568,7 @@ impl Path {
         let Switch { way, z, ln_z, rise, pace_over_z } = switch;
         let (law, to) = (problem.law, &problem.to);
         let theta = Lifetime::with(to.theta * exp(-way), to.rest - to.theta * exp_m1(-way));
-        let fall = exp_m1(way + ln_1p(problem.fall));
+        let fall = exp_m1(way + problem.depth());
         if fall >= 0.0 || way < 0.0 {
             return None;
         }
@@ -645,7 +645,7 @@ mod tests {
                             Bounds { floor, v_ceiling: times * v_f, tau_ceiling: steady(v_i).max(steady(v_f)) + above };
                         let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
                         let problem = Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded: floor };
-                        let ceilings = Ceilings::new(law, [v_i, v_f], ln_1p(problem.fall), &bounds);
+                        let ceilings = Ceilings::new(law, [v_i, v_f], problem.depth(), &bounds);
                         let q_floor = problem.q_floor();
                         for i in -30..=30 {
                             let q = 0.2501 * f64::from(i);

@@ -10,7 +10,7 @@ use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum, floor};
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::turning;
 use crate::protocol::{Solved, SolverStats, Status};
@@ -28,7 +28,7 @@ pub(super) enum Feasible {
 
 /// What the ceilings allow, without iteration.
 pub(super) fn feasible(problem: &Problem, ceilings: &Ceilings) -> Feasible {
-    let depth = ln_1p(problem.fall);
+    let depth = problem.depth();
     let (cap_end, cap_start) = (ceilings.cap(0.0), ceilings.cap(depth));
     let kind = |y: f64| if y < ceilings.crossing() { ArcKind::VCeiling } else { ArcKind::TauCeiling };
     if !problem.rises() {
@@ -152,7 +152,7 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
 /// The optimum where a ceiling certainly binds, without the free one; `None` where that is not known from the first parameter.
 fn find_bound(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64, guess: &Guess) -> Option<Constrained> {
     let &Guess { q_floor, p, error } = guess;
-    let (t_f, depth, origin) = (time.whole, ln_1p(problem.fall), q_floor.unwrap_or(0.0));
+    let (t_f, depth, origin) = (time.whole, problem.depth(), q_floor.unwrap_or(0.0));
     // Friction is so high all along every path that the free optimum is proven: where v >= 1, or where u > 1.
     let at_floor = 1.0 + problem.law.b * problem.from.ln.min(problem.to.ln);
     let at_once = problem.fall > 0.0 && p + origin > 0.0;
@@ -344,7 +344,7 @@ impl Search<'_> {
         }
         // ln(theta_c/theta_1), and below the end of greater theta.
         let y_c = ceilings.z_tau / slope;
-        let above = y_c - ln_1p(problem.fall).max(0.0);
+        let above = y_c - problem.depth().max(0.0);
         let ln_theta_c = problem.to.ln + y_c;
         if above <= 0.0 || (problem.bounded && ln_theta_c >= 0.0) || ceilings.z_v + y_c <= 0.0 {
             return None;
@@ -368,7 +368,7 @@ impl Search<'_> {
     /// Theta rises to the end, last on a ceiling: the parameter is where the ceiling begins.
     fn rising(&self) -> Constrained {
         let (problem, ceilings) = (self.problem, self.ceilings);
-        let whole_way = -ln_1p(problem.fall);
+        let whole_way = -problem.depth();
         if let Some(y) = lingering(ceilings, -whole_way) {
             let slope = -ceilings.kappa;
             // z at the switch is e^-s of what it is at the end.
@@ -416,7 +416,7 @@ impl Search<'_> {
 /// are left.
 fn all_on_ceilings(problem: &Problem, ceilings: &Ceilings) -> f64 {
     let Law { a, b } = problem.law;
-    let depth = ln_1p(problem.fall);
+    let depth = problem.depth();
     let friction_0 = problem.friction_a();
     // theta_0 (C - C_0) at a place, and a E(theta_0) there.
     let excess = |y: f64| {

@@ -36,7 +36,7 @@ pub(super) struct Problem {
 }
 
 /// Largest `ln u` that is searched: protocols of `1e-300` in units of `l/v_0`. Derived: beyond, `e^(ln u)` comes near overflow, at 709.
-const MAX_LN_U: f64 = 690.0;
+pub(super) const MAX_LN_U: f64 = 690.0;
 
 /// One member of the family.
 #[derive(Debug, Clone, Copy)]
@@ -101,9 +101,9 @@ impl Problem {
         self.fall < 0.0
     }
 
-    /// `theta_1/theta_0 - 1`, free of cancellation.
-    fn rise(&self) -> f64 {
-        -self.fall / (1.0 + self.fall)
+    /// `ln(theta_0/theta_1)`, free of cancellation.
+    pub fn depth(&self) -> f64 {
+        if self.fall < -0.5 { self.from.ln - self.to.ln } else { ln_1p(self.fall) }
     }
 
     /// The least time of a rising problem (0 for a falling one): `v = 1` or, without the bound, `v = 0` throughout.
@@ -184,7 +184,7 @@ impl Problem {
 
     /// About how far from 0 the parameter is of a protocol that takes `beyond` more than the least time.
     pub fn reach(&self, beyond: f64) -> f64 {
-        beyond * self.friction_a().abs() / (self.law.a * self.theta_a()) + ln_1p(self.fall).abs()
+        beyond * self.friction_a().abs() / (self.law.a * self.theta_a()) + self.depth().abs()
     }
 
     /// Bounds of the parameter, counted from `q_floor`: a floor arc cannot last longer than the whole, and `e^q` must stay a
@@ -301,7 +301,7 @@ impl Problem {
             };
             return self.without_hold(arc, z_0, end.ln_u, rate);
         }
-        let y_end = -ln_1p(self.fall);
+        let y_end = -self.depth();
         let chart = Chart::Direct { theta_a: self.from.theta, z_a: z_0, friction_a, y_start: 0.0, y_end };
         let arc = Arc { law, chart };
         self.without_hold(arc, z_0, arc.end()?.ln_u, Rate::Direct { gain: 1.0 })
@@ -431,8 +431,7 @@ impl Problem {
 
     /// For a rising problem: where the arc starts, from `kappa = theta_1 (C - C_leaving(theta_1))`.
     fn leaving(&self, kappa: f64) -> Leaving {
-        // ln(theta_0/theta_1), from what has its digits.
-        let all = if self.fall < -0.5 { self.from.ln - self.to.ln } else { -ln_1p(self.rise()) };
+        let all = self.depth();
         let at_once = Leaving { time_at_floor: 0.0, late: self.rest_beyond(), d: all };
         if !self.bounded {
             return at_once;

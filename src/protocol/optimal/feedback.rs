@@ -29,7 +29,7 @@ pub fn feedback_at(
     let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else {
         return failed(Status::Infeasible, SolverStats::default());
     };
-    let ceilings = Ceilings::new(law, [1.0 / theta, v_f], ln_1p(problem.fall), &bounds);
+    let ceilings = Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), &bounds);
     let Constrained { solved, path, sitting } =
         constrained::find(&problem, &ceilings, Time::since(&problem, t_left), rtol);
     let Solved { status, value, stats } = solved;
@@ -89,7 +89,7 @@ pub fn motion_from(
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
     let bounds = bounds.into();
     let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else { return (INFEASIBLE, None) };
-    super::motion_of(&problem, &Ceilings::new(law, [1.0 / theta, v_f], ln_1p(problem.fall), &bounds), t_left, rtol)
+    super::motion_of(&problem, &Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), &bounds), t_left, rtol)
 }
 
 /// The optimal feedback: velocity and multipliers.

@@ -6,7 +6,7 @@ use super::arc::phi;
 use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};
@@ -97,7 +97,7 @@ fn line(problem: &Problem, q_floor: Option<f64>, beyond: f64) -> f64 {
     let z_end = turning((2.0 * e).sqrt()).ln_u;
     let z_start = z_end - beyond * friction / (law.a * problem.from.theta);
     if z_start > 0.0 {
-        let fast = problem.from.theta * ln_1p(problem.fall) / beyond;
+        let fast = problem.from.theta * problem.depth() / beyond;
         z_start.max(ln(fast) - 1.5) - origin
     } else {
         let q = -(2.0 * phi(z_start)).sqrt();
@@ -145,7 +145,7 @@ fn between(near: f64) -> Lanes {
 
 impl Falling {
     fn of(problem: &Problem) -> Falling {
-        let depth = ln_1p(problem.fall);
+        let depth = problem.depth();
         Falling { law: problem.law, theta_0: problem.from.theta, depth, friction: problem.friction_a() }
     }
 

@@ -22,7 +22,6 @@ mod slopes;
 
 use super::{Motion, Solved, SolverStats, Status};
 use crate::model::Transition;
-use crate::numerics::elementary::ln_1p;
 use ceiling::Ceilings;
 use constrained::Constrained;
 use extremal::Problem;
@@ -238,7 +237,7 @@ fn posed(transition: &Transition, t_f: f64, bounds: &Bounds) -> Option<(Problem,
     let problem = Problem::of(transition, bounds.floor)?;
     let inside = t_f > 0.0 && t_f.is_finite() && bounds.is_valid();
     let &Transition { law, v_i, v_f } = transition;
-    inside.then(|| (problem, Ceilings::new(law, [v_i, v_f], ln_1p(problem.fall), bounds)))
+    inside.then(|| (problem, Ceilings::new(law, [v_i, v_f], problem.depth(), bounds)))
 }
 
 /// The optimal protocol and its motion.

@@ -3,10 +3,10 @@
 use super::arc::Sums;
 use super::ceiling::Ceilings;
 use super::clamp::Path;
-use super::extremal::{Extremal, Problem};
+use super::extremal::{Extremal, MAX_LN_U, Problem};
 use super::guess::Guess;
 use super::{ArcKind, Optimum, Strategy, floor};
-use crate::numerics::elementary::{exp, ln_1p};
+use crate::numerics::elementary::{exp, ln};
 use crate::numerics::root::{Probe, newton_in_pieces};
 use crate::protocol::{Solved, SolverStats, Status};
 
@@ -271,7 +271,7 @@ pub(super) fn free(
 /// extremal the only one, or friction was too low for that on the way.
 fn failure(problem: &Problem, ceilings: &Ceilings, met: f64) -> Status {
     let under_ceilings = |steady: f64, y: f64| steady + problem.law.a * ceilings.cap(y);
-    let start = under_ceilings(problem.friction_start(), ln_1p(problem.fall));
+    let start = under_ceilings(problem.friction_start(), problem.depth());
     let least = start.min(under_ceilings(problem.friction_end(), 0.0)).min(met);
     let doubtful = problem.is_doubtful() || least <= problem.unique_above();
     if doubtful { Status::Unproven } else { Status::NotConverged }
@@ -288,8 +288,12 @@ pub(super) fn read(
 ) -> Option<(Status, Option<Optimum>)> {
     let Extremal { time_at_floor, ref arc, .. } = path.extremal;
     let (first, last) = path.pieces().next().zip(path.pieces().last())?;
-    let velocity =
-        |(theta, z): (f64, f64), kind: ArcKind| if kind == ArcKind::VCeiling { ceilings.v } else { exp(z) / theta };
+    let velocity = |(theta, z): (f64, f64), kind: ArcKind| match kind {
+        ArcKind::VCeiling => ceilings.v,
+        // exp(z) would lose digits below the normal numbers.
+        _ if z < -MAX_LN_U => exp(z - ln(theta)),
+        _ => exp(z) / theta,
+    };
     let held = time_at_floor > 0.0;
     let v_start = if held { 1.0 } else { velocity(first.ends()[0], first.kind()) };
     let v_end = velocity(last.ends()[1], last.kind());
