@@ -182,7 +182,7 @@ mod tests {
     fn simulated_growth(law: Law, inertia: f64, z: f64) -> f64 {
         let Law { a, b } = law;
         let slider = ScaledBlock { state_law: StateLaw::Ageing, a, b, inertia, k: (b - a) * (1.0 + inertia / a) };
-        let mut orbit = Orbit::new(&slider, [z, 0.0, 0.0], 1e-13);
+        let mut orbit = Orbit::new(&slider, [z, 0.0, 0.0], 1e-13, 0.0);
         let mut budget = 100_000;
         let mut before = z;
         for _ in 0..20 {

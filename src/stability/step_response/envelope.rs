@@ -162,7 +162,7 @@ pub(super) fn distance([w, y]: SectionPoint, size: f64) -> f64 {
 impl Follower<'_> {
     /// Integrates the cycle from a section point.
     pub(super) fn map_step(&mut self, from: SectionPoint, tolerance: f64) -> Result<MapStep, StopReason> {
-        let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance);
+        let mut orbit = Orbit::new(self.slider, self.slider.state(from), tolerance, self.rtol);
         let mut budget = self.budget.min(MAX_CYCLE_STEPS);
         let before = budget;
         let cycle = orbit.cycle(false, &mut budget);

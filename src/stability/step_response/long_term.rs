@@ -74,6 +74,7 @@ pub(super) fn follow_once(
         budget: MAX_STEPS,
         extrema: [None; 2],
         is_peak_ambiguous: false,
+        touches_band: false,
         t: 0.0,
     };
     let long_term = match follower.run(slider.steady(x)) {
@@ -81,8 +82,9 @@ pub(super) fn follow_once(
         Err(StopReason::Divergence) => LongTermBehaviour::BlowUp,
         Err(_) => LongTermBehaviour::Undecided,
     };
-    let Follower { extrema: [low, high], t, budget, is_peak_ambiguous, .. } = follower;
-    let unresolved = UnresolvedNumbers { t_peak: is_peak_ambiguous, ..UnresolvedNumbers::default() };
+    let Follower { extrema: [low, high], t, budget, is_peak_ambiguous, touches_band, .. } = follower;
+    let unresolved =
+        UnresolvedNumbers { t_peak: is_peak_ambiguous, settling_time: touches_band, ..UnresolvedNumbers::default() };
     Simulation { long_term, high, low, t, steps: MAX_STEPS - budget, unresolved }
 }
 
@@ -106,6 +108,8 @@ pub(super) struct Follower<'a> {
     extrema: [Option<Extremum>; 2],
     /// Whether two peaks are equal within [`PEAK_TIE`].
     is_peak_ambiguous: bool,
+    /// Whether an extremum so far touches the band of settled velocities.
+    touches_band: bool,
     t: f64,
 }
 
@@ -212,6 +216,7 @@ impl<'a> Follower<'a> {
         let cycle = segment.orbit.cycle(self.linear.stable, &mut self.budget);
         self.t = segment.offset + segment.orbit.t();
         let extrema = cycle.as_ref().map_or_else(|_| segment.orbit.extrema(), |cycle| cycle.extrema);
+        self.touches_band = segment.orbit.touches().unwrap_or(self.touches_band);
         self.note_extrema(segment, extrema);
         cycle
     }
@@ -235,7 +240,7 @@ impl<'a> Follower<'a> {
     /// Segment from a state, for a motion of this size.
     fn segment(&self, state: State, size: f64, offset: f64, settled_since: f64) -> OrbitSegment<'a> {
         let tolerance = self.step_error(size);
-        let orbit = Orbit::new(self.slider, state, tolerance);
+        let orbit = Orbit::new(self.slider, state, tolerance, self.rtol);
         OrbitSegment {
             orbit,
             offset,

@@ -60,6 +60,10 @@ pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 /// output, of order 5, is smaller at every tolerance.
 const POLISH_WINDOW: [f64; 2] = [0.125, 0.125];
 
+/// Distance of an extremum from the edge of the band of settled velocities, relative to the edge, below which it is refined. Chosen: the error of the
+/// dense output is smaller.
+const NEAR_EDGE: f64 = 0.01;
+
 /// Integration of a response, with its cycles.
 #[derive(Debug)]
 pub struct Orbit<'a> {
@@ -80,6 +84,11 @@ pub struct Orbit<'a> {
     low: Option<RoughExtremum>,
     /// The last entry into the band of settled velocities; `None` outside.
     entry: Option<BandEntry>,
+    /// Accuracy of `x` at an extremum.
+    x_error: f64,
+    /// Whether the last extremum outside the band, or near its edge, is so near that rounding decides on which side; `None`
+    /// if there was no such extremum.
+    touches: Option<bool>,
 }
 
 /// Extremum to the accuracy of the dense output.
@@ -98,8 +107,8 @@ struct BandEntry {
 }
 
 impl<'a> Orbit<'a> {
-    /// Orbit from `state`, with errors of a step below `tolerance`.
-    pub fn new(slider: &'a ScaledBlock, state: State, tolerance: f64) -> Orbit<'a> {
+    /// Orbit from `state`, with errors of a step below `tolerance` and of `x` at an extremum below `x_error`.
+    pub fn new(slider: &'a ScaledBlock, state: State, tolerance: f64, x_error: f64) -> Orbit<'a> {
         Orbit {
             slider,
             run: slider.run(state, slider.first_step(&state), tolerance),
@@ -111,6 +120,8 @@ impl<'a> Orbit<'a> {
             high: None,
             low: None,
             entry: is_inside(state[X]).then_some(BandEntry { edge: state[X], position: None }),
+            x_error,
+            touches: None,
         }
     }
 
@@ -194,6 +205,17 @@ impl<'a> Orbit<'a> {
     /// Records an extremum after a rise or a fall, if `v = v_f` has been reached and the extremum exceeds `v_f` and the one
     /// before: at rest, rounding makes extrema too.
     fn note_extremum(&mut self, slope: f64, seen: RoughExtremum) {
+        let edge = BAND[usize::from(slope > 0.0)];
+        let beyond = seen.rough.x / edge - 1.0;
+        if beyond.abs() < NEAR_EDGE {
+            let refined = self.refined(seen).x / edge - 1.0;
+            let is_ambiguous = refined.abs() * edge.abs() < self.x_error || refined * beyond <= 0.0;
+            if is_ambiguous || beyond > 0.0 {
+                self.touches = Some(is_ambiguous);
+            }
+        } else if beyond > 0.0 {
+            self.touches = Some(false);
+        }
         let (kept, sign) = if slope > 0.0 { (&mut self.high, 1.0) } else { (&mut self.low, -1.0) };
         let out = sign * seen.rough.x;
         if self.met && out > 0.0 && kept.is_none_or(|kept| out > sign * kept.rough.x) {
@@ -266,6 +288,11 @@ impl<'a> Orbit<'a> {
     /// Minimum and maximum of the velocity since the last section, if there are any.
     pub fn extrema(&self) -> [Option<RoughExtremum>; 2] {
         [self.low, self.high]
+    }
+
+    /// Whether an extremum near the edge of the band leaves the settling time open; `None` if no extremum decides it.
+    pub fn touches(&self) -> Option<bool> {
+        self.touches
     }
 
     /// Time of the last entry into the band of settled velocities; `None` outside the band.
