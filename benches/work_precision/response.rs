@@ -64,7 +64,7 @@ fn judge(found: &Answer, truth: &Answer) -> f64 {
 fn ours(case: &Case, tolerance: f64) -> Option<Answer> {
     let ScaledStep { slider, ratio } = &case.scaled;
     // The errors of the steps add up.
-    let mut orbit = Orbit::new(slider, slider.steady(ratio.ln()), 0.05 * tolerance);
+    let mut orbit = Orbit::new(slider, slider.steady(ratio.ln()), 0.05 * tolerance, tolerance);
     let mut budget = MOST_STEPS;
     let mut end = [f64::NAN; 3];
     for _ in 0..CYCLES {
