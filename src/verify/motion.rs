@@ -30,8 +30,8 @@ pub struct Followed {
     reach: f64,
 }
 
-/// Rounding of the slope at the end of a polynomial through sixteen values, in units of the values. Chosen: thirty times the sum, 640, of
-/// the weights, since the values carry errors of the solver, too.
+/// Rounding of the slope at the end of a polynomial through sixteen values, of the velocity or of the time, in units of the values. Chosen: thirty
+/// times the sum, 640, of the weights, since the values carry errors of the solver, too.
 const SLOPE_ROUNDING: f64 = 2e4 * f64::EPSILON;
 
 /// Rounding of a time in the slopes of a polynomial through sixteen of them. Chosen: four roundings for each value.
@@ -165,7 +165,8 @@ impl Followed {
             self.reach += half.integral(slopes, &|at| extension(at).abs()).abs() / a;
             self.force = self.force.max(force.abs() / a);
             let off = (force - self.samples[0].1.friction - self.passed).abs();
-            let lack = off - SLOPE_ROUNDING * m * at[last].v / times[last];
+            let push = m * at[last].v + at[last].t * (force - at[last].friction).abs();
+            let lack = off - SLOPE_ROUNDING * push / times[last];
             self.control = self.control.max(lack / (a * (1.0 + self.reach)));
         }
         self.samples.extend(places.iter().copied().zip(*at));
