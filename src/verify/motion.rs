@@ -23,8 +23,9 @@ pub struct Followed {
     changes: [f64; 3],
     /// Greatest error of the change of the spring force `tau + m v'` as `k int v_c - v dt`, relative to the transmitted force.
     pub control: f64,
-    /// The transmitted force.
+    /// The transmitted force, and the sum of what the rounding of times is multiplied by in it.
     passed: f64,
+    rounded: f64,
     /// Greatest spring force, and greatest force by the control velocity alone, in units of `a`.
     pub force: f64,
     reach: f64,
@@ -102,6 +103,7 @@ impl Followed {
             changes: [0.0; 3],
             control: 0.0,
             passed: 0.0,
+            rounded: 0.0,
             force: 0.0,
             reach: 0.0,
         };
@@ -157,17 +159,22 @@ impl Followed {
             self.equation = self.equation.max(error);
         }
         if k.is_finite() {
-            let speeds = at.map(|moment| moment.v - start.v);
-            let last = at.len() - 1;
-            let force = at[last].friction + m * radau().slopes(&speeds)[last] / slopes[last];
+            let (late, last) = (at[NODES - 1].t, at.len() - 1);
             let extension = |at: &Moment| k * (at.v_c.unwrap_or(at.v) - at.v);
             self.passed += half.integral(slopes, &extension);
             self.reach += half.integral(slopes, &|at| extension(at).abs()).abs() / a;
-            self.force = self.force.max(force.abs() / a);
-            let off = (force - self.samples[0].1.friction - self.passed).abs();
-            let push = m * at[last].v + at[last].t * (force - at[last].friction).abs();
-            let lack = off - SLOPE_ROUNDING * push / times[last];
-            self.control = self.control.max(lack / (a * (1.0 + self.reach)));
+            self.rounded += late * at.iter().map(|at| extension(at).abs()).fold(0.0, f64::max);
+            // Over shorter times rounding leaves no slope.
+            if times[last] > SLOPE_ROUNDING * late {
+                let speeds = at.map(|moment| moment.v - start.v);
+                let push = m * radau().slopes(&speeds)[last] / slopes[last];
+                let force = at[last].friction + push;
+                self.force = self.force.max(force.abs() / a);
+                let off = (force - self.samples[0].1.friction - self.passed).abs();
+                let rounding = SLOPE_ROUNDING * (m * at[last].v + late * push.abs()) / times[last];
+                let lack = off - rounding - f64::EPSILON * self.rounded;
+                self.control = self.control.max(lack / (a * (1.0 + self.reach)));
+            }
         }
         self.samples.extend(places.iter().copied().zip(*at));
         self.weights.extend(dt.iter().zip(&radau().w).map(|(dt, w)| [dt * w, *rounded]));
