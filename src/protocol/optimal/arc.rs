@@ -399,8 +399,10 @@ impl<const N: usize> Line<N> {
             let Some((start, length)) = panels.pop() else { break };
             let half = 0.5 * length;
             let [coarse, fine] = [2 * LANES, 4 * LANES].map(|nodes| kernel(start + half, half, rule(nodes)));
-            // NaN, where there is no arc, stays.
-            if (fine.time - coarse.time).abs() > tolerance.max(AGREEMENT) * before.time {
+            // NaN, where there is no arc, stays. The lag may be far less than the time; it has the rounding of e^z, z down to -690.
+            if (fine.time - coarse.time).abs() > tolerance.max(AGREEMENT) * before.time
+                || (fine.lag - coarse.lag).abs() > tolerance.max(100.0 * AGREEMENT) * before.lag
+            {
                 panels.extend([(start + half, half), (start, half)]);
             } else {
                 total.add(&fine);
