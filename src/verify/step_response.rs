@@ -146,6 +146,11 @@ fn diverges(
     if state_law == StateLaw::Ageing || (state_law == StateLaw::Slip && k < b - a) {
         return Some(k < b - a);
     }
+    // A negative potential falls, and its sublevels are compact.
+    let x = (v_i / v_f).ln();
+    if state_law == StateLaw::Slip && k > b - a && k * (-x).exp_m1() + (k - (b - a)) * x < a {
+        return Some(false);
+    }
     let growth = |q: f64| state_law.rate(q.exp()) / q.exp();
     let slope = |&[y, q]: &[f64; 2]| {
         let (growth, pull) = (growth(q), k * ((y - q).exp() - 1.0));

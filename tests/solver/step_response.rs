@@ -837,3 +837,24 @@ fn regress_a_peak_at_the_edge_of_the_band_leaves_the_settling_time_open() {
     }
     assert!(respond(&step, 1e-8).settling_time.is_some());
 }
+
+/// Just above the critical stiffness the slip law damps hardly at all, and the errors of coarse runs let steps diverge that are proved to settle.
+#[test]
+fn regress_errors_of_a_run_let_no_step_diverge_that_is_proved_to_settle() {
+    let law = Law { a: 0.01, b: 0.2 };
+    for v_i in [200.0, 300.0, 1e3, 1e4, 1e5] {
+        let transition = Transition { law, v_i, v_f: 100.0 };
+        for above in [1e-9, 1e-8, 1e-7, 1e-6] {
+            let step = VelocityStep { state_law: StateLaw::Slip, transition, k: 0.19 * (1.0 + above), m: 0.0 };
+            for rtol in [1e-2, 1e-3, 1e-4, 1e-5] {
+                let (status, response) = step.respond(rtol);
+                let outcome = response.map(|response| response.outcome);
+                assert_eq!(status, Status::Ok, "{v_i} {above} {rtol}");
+                assert!(
+                    matches!(outcome, Some(Outcome::Settled | Outcome::Undecided)),
+                    "{v_i} {above} {rtol}: {outcome:?}"
+                );
+            }
+        }
+    }
+}
