@@ -15,27 +15,41 @@ use nalgebra::{DMatrix, DVectorView, Matrix3};
 
 use crate::numerics::elementary::exp;
 use crate::numerics::radau::{NODES, Radau, radau};
-use crate::protocol::compliant::CompliantPath;
+use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::{Jet, SpringBlock};
 use crate::stability::OpenLoopResult;
 
-/// Amplification of a small error of the state from start to end: the largest singular value of the fundamental matrix.
+/// Amplification of a small error of the state from start to end of the shortcut from `v_i` to `v_f` in `t_f`: the largest singular value of the
+/// fundamental matrix.
 ///
-/// The norm is the Euclidean norm of `(ln v, ln theta, k s/a)`. The accuracy is `rtol`. Where
-/// some of the three variables follow the others, the initial error is in the others alone, which gives the limits
-/// `m -> 0` and `k -> inf`. 0 below 1e-12. `None` for more than 3,000 steps, and beyond the range of doubles.
-pub fn amplification(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
+/// The norm is the Euclidean norm of `(ln v, ln theta, k s/a)`. Where some of the three variables follow the others, the initial error is in the
+/// others alone, which gives the limits `m -> 0` and `k -> inf`. The accuracy is `rtol`; 0 below 1e-12. `None` without a shortcut, where two runs do
+/// not agree to `rtol`, for more than 3,000 steps of a run, and beyond the range of doubles.
+pub fn amplification(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, rtol: f64) -> OpenLoopResult {
     let mut steps = 0;
-    let number = growth(path, rtol, &mut steps).filter(|growth| growth.is_finite());
-    let number = number.map(|growth| if growth < MIN_AMPLIFICATION { 0.0 } else { growth });
-    OpenLoopResult { number, steps }
+    let mut confirmed = || {
+        let path = compliant::path(slider, velocities, t_f, (PATH_ACCURACY * rtol).max(MIN_PATH_RTOL)).ok()?;
+        let tolerance = (STEP_ACCURACY * rtol).clamp(STEP_TOLERANCE.start, STEP_TOLERANCE.end);
+        let rough = growth(&path, COARSENING * tolerance, &mut steps)?;
+        let fine = growth(&path, tolerance, &mut steps).filter(|growth| growth.is_finite())?;
+        let agree = (rough - fine).abs() <= rtol * fine.max(MIN_AMPLIFICATION);
+        agree.then_some(if fine < MIN_AMPLIFICATION { 0.0 } else { fine })
+    };
+    OpenLoopResult { number: confirmed(), steps }
 }
 
-/// Amplification below which 0 is returned. Rounding of a step decays at the slowest rate, so small factors lose digits. Measured
-/// with `sweeps/compliant.toml` at an rtol of 1e-10 against 1e-13: 0.8 rtol at 2e-13, 3 rtol at 4e-15, 1000 rtol at 1e-25.
+/// Accuracy of the shortcut, in units of `rtol`. Derived: the relative error of an amplification of `e^700`, the range of doubles, is 700 times that
+/// of the velocity, whose logarithm contains `alpha` times up to some 30.
+const PATH_ACCURACY: f64 = 1e-5;
+
+/// Tightest accuracy of the shortcut: that of the solver.
+const MIN_PATH_RTOL: f64 = 1e-13;
+
+/// Amplification below which 0 is returned. Chosen: such an error is below every rounding of a protocol that a computer drives.
 const MIN_AMPLIFICATION: f64 = 1e-12;
 
-fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
+/// The amplification by steps with an error of `tolerance`; adds their number to `count`.
+fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> {
     let rule = radau();
     let slider = &path.slider;
     let ratio = slider.law.b / slider.law.a;
@@ -45,15 +59,15 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
     let states = if slider.m > 0.0 { 3 } else { 2 };
     let mut flow = DMatrix::identity(states, states);
     let mut h = first_step(slider, &path.jet(0, 0.0));
-    let tolerance = (1e-3 * rtol).max(1e-15);
+    let mut steps = 0;
     for panel in 0..path.panels() {
         let duration = path.panel_duration(panel);
         let mut from = 0.0;
         while from < 1.0 {
-            if *steps == MAX_STEPS {
+            if steps == MAX_STEPS {
                 return None;
             }
-            *steps += 1;
+            (steps, *count) = (steps + 1, *count + 1);
             let to = if from + 1.0001 * h / duration >= 1.0 { 1.0 } else { from + h / duration };
             let (next, error) = step(path, panel, (from, to), &flow, rule)?;
             // The order of the error at the end is higher than that at the nodes.
@@ -63,6 +77,9 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
                 h = (to - from) * duration * change.clamp(0.2, 0.8);
             } else {
                 flow = next;
+                if flow.amax() < VANISHED {
+                    return Some(0.0);
+                }
                 h = ((to - from) * duration * change.clamp(0.5, 4.0)).max(if to == 1.0 { h } else { 0.0 });
                 from = to;
             }
@@ -85,6 +102,23 @@ fn growth(path: &CompliantPath, rtol: f64, steps: &mut u32) -> Option<f64> {
 
 /// Steps of the linearised flow, at most. Chosen: enough for some thousand oscillations.
 const MAX_STEPS: u32 = 3_000;
+
+/// Error of a step, in units of `rtol`, and its range. Measured: estimates miss most at the loosest tolerance; below the range there is rounding.
+const STEP_ACCURACY: f64 = 1e-9;
+const STEP_TOLERANCE: std::ops::Range<f64> = 1e-15..1e-13;
+
+/// Tolerance of the first run, in units of that of the second. Chosen: its steps differ, so that rounding differs, too.
+const COARSENING: f64 = 10.0;
+
+/// Factor of an error in one step, at least. Derived: rounding relative to the start of a step is then below the default `rtol` of its end by three
+/// digits.
+const MIN_STEP_FACTOR: f64 = 1e-3;
+
+/// Rounding of a rate in its terms, in units of the last place. Chosen: that of a few operations.
+const ROUNDINGS: f64 = 1.0;
+
+/// A flow that counts as 0. Chosen: some decades above the least double.
+const VANISHED: f64 = 1e-290;
 
 /// Decay of an error of `ln theta` under a given velocity, `exp(-int dt/theta)`.
 fn decay(path: &CompliantPath, rule: &Radau) -> f64 {
@@ -135,10 +169,17 @@ fn step(
     let next = values.rows((NODES - 1) * n, n).into_owned();
     let mut error = 0.0f64;
     for column in 0..n {
-        let largest = length(&flow.column(column)).max(length(&next.column(column)));
+        let largest = length(&next.column(column));
+        if largest < MIN_STEP_FACTOR * length(&flow.column(column)) {
+            return Some((next, 1.0));
+        }
         for i in 0..n {
-            let change = |j: usize| (0..n).map(|c| rates[j][(i, c)] * values[(j * n + c, column)]).sum();
-            error = error.max(rule.unresolved(&std::array::from_fn(change)) / largest);
+            let term = |j: usize, c: usize| rates[j][(i, c)] * values[(j * n + c, column)];
+            let changes = std::array::from_fn(|j| (0..n).map(|c| term(j, c)).sum());
+            // The terms of a fast variable that follows the others cancel.
+            let size = |j: usize| (0..n).map(|c| term(j, c).abs()).sum::<f64>();
+            let rounding = ROUNDINGS * f64::EPSILON * (0..NODES).map(size).fold(0.0, f64::max);
+            error = error.max((rule.unresolved(&changes) - rounding) / largest);
         }
     }
     error.is_finite().then_some((next, error))

@@ -35,7 +35,7 @@ fields! { Row:
     v_c_max "v_0" "greatest control velocity" => |row| row.member.control_max;
     amplification "1"
         "greatest factor by which a small error grows from start to end, in the norm of (ln v, ln theta, k s/a); 0 below 1e-12; \
-         null beyond 3000 integration steps and beyond the range of doubles"
+         null where two runs differ by more than rtol, beyond 3000 steps of a run and beyond the range of doubles"
         => |row| number(row.amplification);
     sampling_error "1"
         "distance from the final steady state in that norm if v_c is sampled every dt and held; absolute error up to rtol; null for \
@@ -135,8 +135,8 @@ impl MemberCache {
             let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
             *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
             let wanted = job.projection.has(AMPLIFICATION) && solved.value.is_some();
-            let path = wanted.then(|| compliant::path(&slider, velocities, t_f, job.rtol).ok()).flatten();
-            let amplification = path.and_then(|path| value_of(amplification(&path, job.rtol), work));
+            let amplification = wanted.then(|| amplification(&slider, velocities, t_f, job.rtol));
+            let amplification = amplification.and_then(|followed| value_of(followed, work));
             let work_error =
                 solved.value.filter(|_| job.projection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
                     let finest = compliant::solve(&slider, velocities, t_f, error::TIGHTEST_RTOL);

@@ -9,20 +9,27 @@ use crate::model::Transition;
 use crate::protocol::{Moment, SpringBlock, compliant};
 use crate::table::STATUS;
 
-/// `ln(v - 1)` over `x = t/t_f`, as the sum of the powers from 0 to 6.
+/// `ln(v - 1)` over `x = t/t_f`: a quintic between both ends, and `alpha x^3 (1 - x)^3`.
 #[derive(Clone, Copy)]
-struct Exponent([f64; 7]);
+struct Exponent {
+    start: f64,
+    change: f64,
+    alpha: f64,
+}
 
 impl Exponent {
     fn new(problem: &Transition, alpha: f64) -> Exponent {
         let (start, end) = ((problem.v_i - 1.0).ln(), (problem.v_f - 1.0).ln());
-        let l = end - start;
-        Exponent([start, 0.0, 0.0, 10.0 * l + alpha, -15.0 * l - 3.0 * alpha, 6.0 * l + 3.0 * alpha, -alpha])
+        Exponent { start, change: end - start, alpha }
     }
 
     /// Velocity and its first two derivatives in time.
     fn moment(&self, x: f64, t_f: f64) -> [f64; 3] {
-        let [f, g, h] = self.0.iter().rev().fold([0.0; 3], |[f, g, h], c| [f * x + c, g * x + f, h * x + 2.0 * g]);
+        let &Exponent { start, change, alpha } = self;
+        let p = x * (1.0 - x);
+        let f = start + x * x * x * change * (10.0 + x * (6.0 * x - 15.0)) + alpha * p * p * p;
+        let g = p * p * (30.0 * change + 3.0 * alpha * (1.0 - 2.0 * x));
+        let h = p * (60.0 * change * (1.0 - 2.0 * x) + 6.0 * alpha * (1.0 - 5.0 * p));
         let w = f.exp();
         [1.0 + w, w * g / t_f, w * (h + g * g) / (t_f * t_f)]
     }

@@ -163,7 +163,10 @@ impl Followed {
             let extension = |at: &Moment| k * (at.v_c.unwrap_or(at.v) - at.v);
             self.passed += half.integral(slopes, &extension);
             self.reach += half.integral(slopes, &|at| extension(at).abs()).abs() / a;
+            // Velocities are exponential functions of terms of the size of their logarithms.
+            let blurred = |v: f64, at: &Moment| v.abs() * (1.0 + at.v.ln().abs());
             self.rounded += late * at.iter().map(|at| extension(at).abs()).fold(0.0, f64::max);
+            self.rounded += k * half.integral(slopes, &|at| blurred(at.v_c.unwrap_or(at.v), at));
             // Over shorter times rounding leaves no slope.
             if times[last] > SLOPE_ROUNDING * late {
                 let speeds = at.map(|moment| moment.v - start.v);
@@ -171,7 +174,7 @@ impl Followed {
                 let force = at[last].friction + push;
                 self.force = self.force.max(force.abs() / a);
                 let off = (force - self.samples[0].1.friction - self.passed).abs();
-                let rounding = SLOPE_ROUNDING * (m * at[last].v + late * push.abs()) / times[last];
+                let rounding = SLOPE_ROUNDING * (m * blurred(at[last].v, &at[last]) + late * push.abs()) / times[last];
                 let lack = off - rounding - f64::EPSILON * self.rounded;
                 self.control = self.control.max(lack / (a * (1.0 + self.reach)));
             }

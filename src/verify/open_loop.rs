@@ -47,22 +47,22 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
         let SpringBlock { law, k, m } = self.slider;
         let (t_f, length, follows) = (self.t_f, 1.0 / ERROR_INTERVALS as f64, m == 0.0);
         let rigid = k == f64::INFINITY;
-        // Errors of v, theta and k s/a. A rigid spring gives v, and without mass the force does.
+        // Errors of v, ln theta and k s/a. A rigid spring gives v, and without mass the force does.
         let slope = |y: &[f64; 5]| {
             let (theta, v) = (y[0].exp(), (self.velocity)(y[1]));
-            let driven = law.a * y[4] - law.b / theta * y[3];
+            let driven = law.a * y[4] - law.b * y[3];
             let (dv, rate) = match () {
                 () if rigid => (0.0, 0.0),
                 () if follows => (v * driven / law.a, 0.0),
                 () => (y[2], (driven - law.a / v * y[2]) / m),
             };
             let force = if rigid { 0.0 } else { -k / law.a * dv };
-            [t_f * (1.0 / theta - v), 1.0, t_f * rate, -t_f * (v * y[3] + theta * dv), t_f * force]
+            [t_f * (1.0 / theta - v), 1.0, t_f * rate, -t_f * (y[3] / theta + dv), t_f * force]
         };
         let mut start = [ln_theta, x, 0.0, 0.0, 0.0];
-        start[2 + unit] = [(self.velocity)(x), ln_theta.exp(), 1.0][unit];
+        start[2 + unit] = [(self.velocity)(x), 1.0, 1.0][unit];
         let end = integrate(slope, start, (0.0, length))?;
-        let error = Vector3::new(end[2] / (self.velocity)(x + length), end[3] / end[0].exp(), end[4]);
+        let error = Vector3::new(end[2] / (self.velocity)(x + length), end[3], end[4]);
         Some((end[0], error))
     }
 

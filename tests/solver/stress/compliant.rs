@@ -134,7 +134,9 @@ fn what_becomes_of_a_compliant_open_loop_is_a_number_or_none() {
             Err(status) => return row.status(status),
         };
         row.status(Status::Ok);
-        for found in [amplification(&path, rtol), open_loop_error(&path, rtol), held_error(&path, dt, rtol)] {
+        for found in
+            [amplification(&slider, velocities, t_f, rtol), open_loop_error(&path, rtol), held_error(&path, dt, rtol)]
+        {
             row.fact("few steps", found.steps <= MOST_STEPS);
             row.fact("a number or none", found.number.is_none_or(|number| number >= 0.0 && number.is_finite()));
         }
