@@ -622,3 +622,15 @@ fn regress_two_extremes_between_two_nodes_are_found() {
     let found = fine.filter_map(|s| motion.at(s).v_c).fold(f64::NEG_INFINITY, f64::max);
     assert!(value.control_max >= found * (1.0 - 2e-10), "{} {found}", value.control_max);
 }
+
+/// Rounding of places left no slope in the search for the start of the last piece: the row did not converge. The gap of short pieces is in
+/// proportion to their length.
+#[test]
+fn regress_pieces_of_a_billionth_of_the_duration_are_solved() {
+    let slider = SpringBlock { law: Law { a: 0.119015, b: 0.015379 }, k: 0.922764, m: 1.923139e-7 };
+    let case = Case { slider, velocities: (4.181147, 4.238696), t_f: 0.01289901, bounded: true };
+    let gap = |part: f64| solve(&case, part * case.t_f, 1e-10).value.expect("is solved").gap;
+    for part in [1e-9, 2e-9, 3e-9, 5e-9, 1e-8] {
+        assert!(relative(gap(part) / part, gap(1e-7) / 1e-7) < 4.0 * f64::EPSILON / part + 1e-7, "{part}");
+    }
+}

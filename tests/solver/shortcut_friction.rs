@@ -470,3 +470,18 @@ fn regress_slips_known_to_the_rounding_of_the_time_to_spare_are_not_the_last_wor
         }
     }
 }
+
+/// At a loose tolerance no search found this deceleration.
+#[test]
+fn regress_a_long_deceleration_is_solved_at_a_loose_tolerance() {
+    let law = Law { a: 0.013110174481221705, b: 0.0028126792925256263 };
+    let case = case(law, 392545106.0018382, 160.44390292355547, 0.008992591807774248, 1.2039566420114345);
+    let exact = solve(&case, 1e-10).expect("is solved");
+    for rtol in [1e-2, 1e-3, 1e-4] {
+        let found = solve(&case, rtol).expect("is solved");
+        assert!(
+            relative(found.work, exact.work) < rtol && relative(found.v_max, exact.v_max) < rtol,
+            "{rtol}: {found:?}"
+        );
+    }
+}

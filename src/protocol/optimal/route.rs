@@ -269,24 +269,25 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
     let mut last = (most, f(most));
     let mut d = most * (value / last.1).clamp(0.0, 1.0);
     for _ in 0..MAX_STEPS {
-        if d <= low || d >= high {
-            d = 0.5 * (low + high);
-        }
         let found = f(d);
-        let order = ln(last.1 / found) / ln(last.0 / d);
-        last = (d, found);
         if found < value {
             low = d;
         } else {
             high = d;
         }
-        d *= exp(ln(value / found) / order);
+        let order = ln(last.1 / found) / ln(last.0 / d);
+        last = (d, found);
         // The last step leaves less than the square of what it started from; the rounding of places leaves more.
-        if (found / value - 1.0).abs() <= LAST_STEP_RTOL {
+        let is_close = (found / value - 1.0).abs() <= LAST_STEP_RTOL;
+        let next = d * exp(ln(value / found) / order);
+        // Rounding of places may leave no slope.
+        let is_inside = next > low && next < high;
+        d = if is_inside || is_close { next } else { 0.5 * (low + high) };
+        if is_close || high - low <= f64::EPSILON * high {
             break;
         }
     }
-    d.clamp(0.0, most)
+    if d.is_finite() { d.clamp(0.0, most) } else { last.0 }
 }
 
 /// A relative difference after which one more step is enough. Derived: a step squares it.
