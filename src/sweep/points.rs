@@ -63,7 +63,7 @@ const MAX_POINTS: usize = 1 << 22;
 /// Greatest size of a file, in bytes: 64 for each of [`MAX_POINTS`].
 const MAX_FILE_BYTES: u64 = 1 << 28;
 
-/// Checks that the file fits into memory: a regular file of at most [`MAX_BYTES`].
+/// Checks that the file fits into memory: a regular file of at most [`MAX_FILE_BYTES`].
 fn check_size(path: &Path) -> Result<(), SpecError> {
     let file = fs::metadata(path).map_err(|error| unreadable(path, &error))?;
     if !file.is_file() {

@@ -33,12 +33,21 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
     let work = cubic.work().ok_or("the integrator did not get there")?;
     let mut verdict = Verdict::default();
     verdict.compare(row, "work", Some(work), None);
-    // The coefficients are stored in double precision, so v_min reaches the bound only within their rounding.
-    // Where theta rises as fast as the slip law allows, the velocity depends on the root of this rounding.
-    let v_min = cubic.v_min();
-    let has_root = state == StateLaw::Slip && cubic.slack() < HALF_OF_THE_DIGITS;
-    verdict.compare(row, "v_min", Some(v_min), has_root.then_some(HALF_OF_THE_DIGITS * v_min / rtol));
-    verdict.friction(row, cubic.friction_min());
+    // The coefficients are stored in double precision, and the velocity is a small difference of 1 and theta', over theta; where theta rises as
+    // fast as its law allows, it depends on the root of this rounding.
+    let (v_min, fastest) = (cubic.v_min(), problem.v_i.max(problem.v_f));
+    let has_root = state != StateLaw::Ageing && cubic.slack() < HALF_OF_THE_DIGITS;
+    let nudge = 1.0 + 2.0 * f64::EPSILON;
+    let nudged = [(a_2 * nudge, a_3), (a_2, a_3 * nudge)].map(|(a_2, a_3)| Cubic::new(&problem, t_f, a_2, a_3));
+    let off = nudged.map(|near| 4.0 * (near.under(state).v_min() - v_min).abs());
+    let noise = fastest * if has_root { HALF_OF_THE_DIGITS } else { 4.0 * f64::EPSILON };
+    let noise = noise.max(off[0]).max(off[1]);
+    verdict.compare(row, "v_min", Some(v_min), Some(v_min + noise / rtol));
+    if noise < v_min {
+        verdict.friction(row, cubic.friction_min());
+    } else {
+        verdict.miss("friction at velocities that the rounding of the coefficients hides");
+    }
     let v_ceiling = number(row, "v_ceiling").unwrap_or(f64::INFINITY);
     if state != StateLaw::Ageing {
         let optimum = relaxed::certify(&mut verdict, &problem, state, (t_f, v_ceiling));
@@ -66,7 +75,7 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
             let near = Cubic::new(&problem, t_f, a_2 + fraction * size * cos, a_3 + fraction * size * sin);
             let near = near.under(state);
             if near.slack() > 0.0 && near.v_min() >= least {
-                saved = saved.max(near.work().map_or(0.0, |near| (work - near) / work));
+                saved = saved.max(near.work().map_or(0.0, |near| (work - near) / work.abs()));
             }
         }
     }

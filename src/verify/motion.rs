@@ -48,6 +48,9 @@ const RESOLVED_WORK_RTOL: f64 = 1e-9;
 /// Change of theta, relative to itself, whose error counts. Chosen: its rounding is then below the default `rtol`.
 const LEAST_CHANGE: f64 = 1e-3;
 
+/// Minima of the samples that are refined. Chosen: more than a protocol has that are about as low as the least.
+const REFINED_MINIMA: usize = 8;
+
 /// Half of an interval: moments at the nodes of the rule, and what the rule needs for integrals over time.
 struct Half {
     start: Moment,
@@ -227,12 +230,18 @@ impl Followed {
         self.motion.at(1.0)
     }
 
-    /// Least value of a function of the moment.
+    /// Least value of a function of the moment, refined about the lowest minima of the samples.
     pub fn least(&self, f: impl Fn(&Moment) -> f64) -> f64 {
-        let values = self.samples.iter().map(|(_, moment)| f(moment)).enumerate();
-        let (index, least) = values.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, f64::NAN));
-        let s = |index: usize| self.samples[index.min(self.samples.len() - 1)].0;
-        golden(&|s| f(&self.motion.at(s)), s(index.saturating_sub(1)), s(index + 1)).1.min(least)
+        let values: Vec<f64> = self.samples.iter().map(|(_, moment)| f(moment)).collect();
+        let (end, above) = (values.len() - 1, |index: usize| values.get(index).copied().unwrap_or(f64::INFINITY));
+        let is_minimum = |&i: &usize| above(i) <= above(i.wrapping_sub(1)) && above(i) < above(i + 1);
+        let mut minima: Vec<usize> = (0..values.len()).filter(is_minimum).collect();
+        minima.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
+        let around = |&i: &usize| {
+            let [from, to] = [i.saturating_sub(1), (i + 1).min(end)].map(|index| self.samples[index].0);
+            golden(&|s| f(&self.motion.at(s)), from, to).1.min(values[i])
+        };
+        minima.iter().take(REFINED_MINIMA).map(around).fold(f64::NAN, f64::min)
     }
 
     /// Greatest value of a function of the moment.

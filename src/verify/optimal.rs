@@ -232,7 +232,7 @@ impl Optimum {
 pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
     let (problem, t_f) = (transition(row)?, axis(row, "t_f")?);
     if context.friction == Friction::Regularised {
-        return arcsinh::check(row, &problem, t_f);
+        return arcsinh::check(row, &problem, t_f, rtol);
     }
     let law = state_law(row)?;
     if law != StateLaw::Ageing {

@@ -55,9 +55,10 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
     verdict.compare(row, "work_optimal", Some(optimum.work), None);
     verdict.compare(row, "work", Some(followed.work), None);
     let excess = followed.work - optimum.work;
-    // A difference of works that are each known to about 1e-12.
-    let scale = excess.abs() + 1e-12 / rtol * (followed.work.abs() + optimum.work.abs());
-    verdict.compare(row, "gap", Some(excess / optimum.work), Some(scale / optimum.work));
+    // A difference of works that are each known to about 1e-12, and to the rounding of times.
+    let rounding = followed.rounding(|at| at.friction * at.v) + 1e-12 * (followed.work.abs() + optimum.work.abs());
+    let scale = excess.abs() + rounding / rtol;
+    verdict.compare(row, "gap", Some(excess / optimum.work), Some(scale / optimum.work.abs()));
     let v = followed.compare_velocities(&mut verdict, row);
     followed.compare_control(&mut verdict, row);
     let friction_min = followed.least(|at| at.friction);

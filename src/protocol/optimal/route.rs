@@ -7,7 +7,7 @@ use super::motion::{Floor, Timed};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
-use crate::protocol::control::{Jet, SpringBlock, Tolerance, ValueRange};
+use crate::protocol::control::{Jet, Tolerance, ValueRange};
 
 /// A place on the protocol.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +28,18 @@ pub struct PathSegment {
     /// Work of friction.
     pub work: f64,
 }
+
+impl PathSegment {
+    /// This short segment in proportion to `time`, if only rounding of its places makes it last longer or shorter.
+    pub fn lasting(self, time: f64) -> PathSegment {
+        let factor = time / self.time;
+        let is_rounding = (factor - 1.0).abs() < PLACE_ROUNDING;
+        if is_rounding { PathSegment { time, lag: self.lag * factor, work: self.work * factor } } else { self }
+    }
+}
+
+/// Greatest relative rounding of the duration of a segment. Derived: a place is rounded to 1e-16, the shortest segments are 1e-9 of the duration.
+const PLACE_ROUNDING: f64 = 1e-6;
 
 /// The free optimal protocol: the floor arc, then the free arc.
 pub struct Route {
@@ -186,21 +198,24 @@ impl Route {
         span
     }
 
-    /// Takes the range of `v_c` between two places into `extent`, turns good to `rtol`.
-    pub fn control(&self, slider: &SpringBlock, from: PathPoint, to: PathPoint, rtol: f64, extent: &mut ValueRange) {
+    /// Extends a range to a function of the protocol between two places, good to `tolerance`; `moment` is its value and slope in time.
+    pub fn range(
+        &self,
+        from: PathPoint,
+        to: PathPoint,
+        tolerance: Tolerance,
+        extent: &mut ValueRange,
+        moment: impl Fn(&Jet) -> [f64; 2],
+    ) {
         if let PathPoint::Held(start) = from {
-            // v_c = 1 + (b/k) theta'/theta falls all the way.
+            // v_c = 1 + (b/k) theta'/theta falls all the way, and v rests.
             let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
-            extent.add(slider.control(&self.held(start)));
-            extent.add(slider.control(&self.held(end)));
+            extent.add(moment(&self.held(start))[0]);
+            extent.add(moment(&self.held(end))[0]);
         }
         let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) else { return };
         let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-        let moment_at = |place| {
-            let jet = self.jet(PathPoint::Moving(place));
-            let bend = -(jet.rate * jet.v[0] + jet.theta * jet.v[1]);
-            [slider.control(&jet), slider.control_rate(&jet, bend)]
-        };
+        let moment_at = |place| moment(&self.jet(PathPoint::Moving(place)));
         for (from, to) in arc.parts(start, end) {
             let mut before = (from, moment_at(from));
             extent.add(before.1[0]);
@@ -212,8 +227,7 @@ impl Route {
                     let pace = arc.pieces.time(before.0, after.0) / (after.0 - before.0);
                     let along = |place, [value, slope]: [f64; 2]| (place, [value, pace * slope]);
                     let (first, last) = (along(before.0, before.1), along(after.0, after.1));
-                    extent
-                        .add_interval(first, last, Tolerance::OfRange(rtol), |place| along(place, moment_at(place)).1);
+                    extent.add_interval(first, last, tolerance, |place| along(place, moment_at(place)).1);
                 }
                 before = after;
             }

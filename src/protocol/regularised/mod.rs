@@ -8,7 +8,7 @@
 mod motion;
 mod smooth_piece;
 
-use super::control::ValueRange;
+use super::control::{Tolerance, ValueRange};
 use super::optimal::{PathPoint, Route, route};
 use super::{Motion, Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
@@ -172,18 +172,18 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
     ) -> Result<(), Status> {
         let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
         let at = |site| PieceEnd::inner(&route.jet(site));
-        self.replace(route, (route.first(), PieceEnd::outer(v_i)), (leaving, at(leaving)), stats)?;
+        self.replace(route, (route.first(), PieceEnd::outer(v_i)), (leaving, at(leaving)), delta_t, stats)?;
         let mut from = leaving;
         if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
             let start = PathPoint::Held((corner - 0.5 * delta_t).max(delta_t));
             let end =
                 if corner + 0.5 * delta_t < t_f - delta_t { route.after(corner + 0.5 * delta_t) } else { arriving };
             self.keep(route, from, start);
-            self.replace(route, (start, at(start)), (end, at(end)), stats)?;
+            self.replace(route, (start, at(start)), (end, at(end)), delta_t, stats)?;
             from = end;
         }
         self.keep(route, from, arriving);
-        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), stats)
+        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), delta_t, stats)
     }
 
     /// Adds the unchanged optimum between two points.
@@ -192,20 +192,28 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
         if route.time(to) - route.time(from) <= 4.0 * f64::EPSILON * route.duration() {
             return;
         }
-        self.friction_min = self.friction_min.min(route.friction_min(from, to));
-        route.control(&self.slider, from, to, self.rtol, &mut self.control);
+        let (slider, rtol, friction) = (self.slider, self.rtol, route.friction_min(from, to));
+        self.friction_min = self.friction_min.min(friction);
+        route.range(from, to, Tolerance::OfRange(rtol), &mut self.control, |jet| {
+            [slider.control(jet), slider.control_rate(jet, -(jet.rate * jet.v[0] + jet.theta * jet.v[1]))]
+        });
+        // The velocity is stationary where friction passes b - a.
+        if friction <= slider.law.b - slider.law.a {
+            route.range(from, to, Tolerance::OfValue(rtol), &mut self.v, |jet| [jet.v[0], jet.v[1] / jet.v[0]]);
+        }
         (self.visit)(RegularisedSegment::Kept(from, to));
     }
 
-    /// Replaces the optimum between two points by a smooth piece.
+    /// Replaces the optimum between two points by a smooth piece, which lasts `delta_t` unless another piece is too close.
     fn replace(
         &mut self,
         route: &Route,
         (from, start): (PathPoint, PieceEnd),
         (to, end): (PathPoint, PieceEnd),
+        delta_t: f64,
         stats: &mut SolverStats,
     ) -> Result<(), Status> {
-        let span = route.span(from, to);
+        let span = route.span(from, to).lasting(delta_t);
         let piece = SmoothPiece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
         if piece.v.low < MIN_VELOCITY {
             return Err(Status::Infeasible);
