@@ -29,18 +29,6 @@ pub struct PathSegment {
     pub work: f64,
 }
 
-impl PathSegment {
-    /// This short segment in proportion to `time`, if only rounding of its places makes it last longer or shorter.
-    pub fn lasting(self, time: f64) -> PathSegment {
-        let factor = time / self.time;
-        let is_rounding = (factor - 1.0).abs() < PLACE_ROUNDING;
-        if is_rounding { PathSegment { time, lag: self.lag * factor, work: self.work * factor } } else { self }
-    }
-}
-
-/// Greatest relative rounding of the duration of a segment. Derived: a place is rounded to 1e-16, the shortest segments are 1e-9 of the duration.
-const PLACE_ROUNDING: f64 = 1e-6;
-
 /// The free optimal protocol: the floor arc, then the free arc.
 pub struct Route {
     law: Law,

@@ -172,18 +172,18 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
     ) -> Result<(), Status> {
         let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
         let at = |site| PieceEnd::inner(&route.jet(site));
-        self.replace(route, (route.first(), PieceEnd::outer(v_i)), (leaving, at(leaving)), delta_t, stats)?;
+        self.replace(route, (route.first(), PieceEnd::outer(v_i)), (leaving, at(leaving)), stats)?;
         let mut from = leaving;
         if let Some(corner) = route.corner().filter(|&corner| corner > delta_t && corner < t_f - delta_t) {
             let start = PathPoint::Held((corner - 0.5 * delta_t).max(delta_t));
             let end =
                 if corner + 0.5 * delta_t < t_f - delta_t { route.after(corner + 0.5 * delta_t) } else { arriving };
             self.keep(route, from, start);
-            self.replace(route, (start, at(start)), (end, at(end)), delta_t, stats)?;
+            self.replace(route, (start, at(start)), (end, at(end)), stats)?;
             from = end;
         }
         self.keep(route, from, arriving);
-        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), delta_t, stats)
+        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), stats)
     }
 
     /// Adds the unchanged optimum between two points.
@@ -204,16 +204,15 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
         (self.visit)(RegularisedSegment::Kept(from, to));
     }
 
-    /// Replaces the optimum between two points by a smooth piece, which lasts `delta_t` unless another piece is too close.
+    /// Replaces the optimum between two points by a smooth piece.
     fn replace(
         &mut self,
         route: &Route,
         (from, start): (PathPoint, PieceEnd),
         (to, end): (PathPoint, PieceEnd),
-        delta_t: f64,
         stats: &mut SolverStats,
     ) -> Result<(), Status> {
-        let span = route.span(from, to).lasting(delta_t);
+        let span = route.span(from, to);
         let piece = SmoothPiece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
         if piece.v.low < MIN_VELOCITY {
             return Err(Status::Infeasible);
