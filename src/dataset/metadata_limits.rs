@@ -122,7 +122,9 @@ pub fn page_headers(
 /// The length of a header, and of header and page together; `None` if the header extends beyond `bytes`.
 fn check_page(bytes: &[u8]) -> Result<Option<(usize, u64)>, ParquetError> {
     let (mut compressed, mut limits) = (None, Ok(()));
+    // The sizes and counts have 32 bits, whatever the type that the file states.
     let header = walk(bytes, PAGE_HEADER, &mut |path, value| match path {
+        [2 | 3] | [5 | 7 | 8, 1] if i32::try_from(value).is_err() => limits = Err(damaged("page header")),
         [2] if value > MAX_PAGE_BYTES => limits = Err(excess("a page", value, MAX_PAGE_BYTES, "bytes")),
         [3] => compressed = u64::try_from(value).ok(),
         [5 | 7 | 8, 1] if value > MAX_VALUES => limits = Err(excess("a page", value, MAX_VALUES, "values")),
@@ -188,6 +190,11 @@ mod tests {
         for encoding in [6, 7] {
             let error = check_page(&header(20, 2, 2 * encoding)).expect_err("is refused");
             assert!(error.to_string().ends_with("words are encoded as differences"));
+        }
+        // A size whose lowest 32 bits are 2,083,520,512, as one of 32 and as one of 64 bits.
+        for kind in [0x15, 0x16] {
+            let size = [0x15, 0, kind, 0xff, 0xff, 0xff, 0xbc, 0x30, 0x15, 20, 0];
+            assert!(!matches!(check_page(&size), Ok(Some(_))), "{kind:x}");
         }
         // A text of 300 bytes extends beyond the first 256.
         let long = [&header(20, 2, 0)[..12], &[0x98, 0xac, 0x02], &[b'v'; 300], &[0]].concat();

@@ -187,9 +187,11 @@ impl Walker<'_> {
         match (kind, expected) {
             (1 | 2, None) | (3, None | Some(Byte)) => self.skip(1),
             (4..=6, None | Some(Int)) => {
+                // The reader keeps the lowest bits of numbers that are too large for their type, or for the one that it expects.
                 let value = self.whole()?;
+                let fits = kind == 6 || i32::try_from(value).is_ok();
                 (self.visit)(&self.path, value);
-                Some(())
+                fits.then_some(())
             }
             (7, None | Some(Double)) => self.skip(8),
             (8, None | Some(Text)) => {
