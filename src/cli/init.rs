@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::{Failure, refused, say, to_file};
+use super::{Failure, cannot_write, refused, say, to_file};
 use crate::file;
 use crate::sweep::{check_name, schema};
 
@@ -80,11 +80,8 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
         return Err(refused(found, "a new name", "choose another name, or remove the file"));
     }
     let write = |path: &Path, text: &str| {
-        let help = "choose an existing folder with write permission";
         let written = to_file(path, |file| file.write_all(text.as_bytes()));
-        written.map_err(|error: io::Error| {
-            Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))
-        })
+        written.map_err(|error: io::Error| cannot_write(path, &error))
     };
     let schema_path = folder.join(SCHEMA);
     let schema = format!("{:#}\n", schema());

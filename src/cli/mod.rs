@@ -30,7 +30,7 @@ use std::fmt::Display;
 use std::fs::{self, OpenOptions};
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::panic;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
@@ -192,10 +192,46 @@ pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool
     ended(perform(arguments))
 }
 
-/// Writes a file completely or not at all.
+/// Writes a file completely or not at all, unless it belongs to a dataset.
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    to_file(path, |file| file.write_all(bytes))
-        .map_err(|error| Failure::failed(format!("cannot write {}: {error}", path.display())))
+    keep_datasets(path)?;
+    to_file(path, |file| file.write_all(bytes)).map_err(|error| cannot_write(path, &error))
+}
+
+/// The failure for a file that cannot be written.
+fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    let help = match error.kind() {
+        io::ErrorKind::NotFound => "make its folder first, or name an existing one",
+        io::ErrorKind::StorageFull => "free some space, or write to another disk",
+        _ => "choose an existing folder with write permission",
+    };
+    Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))
+}
+
+/// The resolved path of a file, and its folder.
+fn real(out: &Path) -> (PathBuf, PathBuf) {
+    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+    (real, folder)
+}
+
+/// Refuses to replace a part or the manifest of a dataset.
+fn keep_datasets(out: &Path) -> Result<(), Failure> {
+    let (real, folder) = real(out);
+    // Parts are protected even if the manifest is lost.
+    let is_dataset =
+        |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
+    let name = real.file_name().unwrap_or_default().to_string_lossy();
+    let is_manifest = name == "manifest.json" && is_dataset(&folder);
+    if is_manifest || folder.parent().is_some_and(is_dataset) {
+        let what = if is_manifest { "the manifest of a dataset" } else { "in a table of a dataset" };
+        return Err(wrong(format!(
+            "{}: this is {what}, which only `slipsweep run` writes\n  help: write to another file",
+            out.display()
+        )));
+    }
+    Ok(())
 }
 
 /// The failure for a table that is not among `names`; the message begins with `place`.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::{Wait, waiting};
-use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, refused, say, write_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, refused, say, write_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
 use crate::sweep::units_of;
@@ -186,8 +186,7 @@ impl Arguments {
         }
         match (Format::of(out), self.format) {
             (None, _) => Err(wrong(format!(
-                "--out {shown}: the name ends in none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name without \
-                 a dot"
+                "--out {shown}: the name ends in none of .svg, .png, .pdf\n  help: end it in one of these; for a folder, make it first"
             ))),
             (Some(named), Some(given)) if named != given => Err(wrong(format!(
                 "--out {shown}: the ending contradicts --format\n  help: leave out --format, or name a folder"
@@ -206,8 +205,7 @@ impl Arguments {
         let encode = || place.format.encode(&figure.draw(width).svg, self.dpi);
         let bytes = waiting(&Wait::new("writing the picture"), encode)?;
         if let Some(folder) = path.parent() {
-            let failed = |error| Failure::failed(format!("cannot write {}: {error}", path.display()));
-            fs::create_dir_all(folder).map_err(failed)?;
+            fs::create_dir_all(folder).map_err(|error| cannot_write(&path, &error))?;
         }
         write_file(&path, &bytes)?;
         Ok(path)

@@ -18,8 +18,8 @@ use clap::ValueEnum;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
-use super::{Failure, kind, say, stdout, summary, to_file, words, written, wrong};
-use crate::dataset::{Folder, atomic};
+use super::{Failure, cannot_write, keep_datasets, kind, real, say, stdout, summary, to_file, words, written, wrong};
+use crate::dataset::atomic;
 use crate::query::{self, Answer, AnswerError, Tables};
 
 /// Arguments of `query`.
@@ -95,32 +95,6 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     apart(arguments)
-}
-
-/// The resolved path of a file, and its folder.
-fn real(out: &Path) -> (PathBuf, PathBuf) {
-    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-    (real, folder)
-}
-
-/// Refuses to replace a part or the manifest of a dataset.
-fn keep_datasets(out: &Path) -> Result<(), Failure> {
-    let (real, folder) = real(out);
-    // Parts are protected even if the manifest is lost.
-    let is_dataset =
-        |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
-    let name = real.file_name().unwrap_or_default().to_string_lossy();
-    let is_manifest = name == "manifest.json" && is_dataset(&folder);
-    if is_manifest || folder.parent().is_some_and(is_dataset) {
-        let what = if is_manifest { "the manifest of a dataset" } else { "in a table of a dataset" };
-        return Err(wrong(format!(
-            "{}: this is {what}, which only `slipsweep run` writes\n  help: write the answer elsewhere, such as --out answer.csv",
-            out.display()
-        )));
-    }
-    Ok(())
 }
 
 /// Answers a query in a separate process: this program again, whose messages come through a pipe.
@@ -288,7 +262,7 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let path = arguments.output.out.display();
     let fill = |file: &mut dyn Write| write(answer, format, &mut BufWriter::new(file));
     to_file(&arguments.output.out, fill).map_err(|error| match error {
-        AnswerError::Write(error) => Failure::failed(format!("cannot write {path}: {error}")),
+        AnswerError::Write(error) => cannot_write(&arguments.output.out, &error),
         error => failure(&tables, arguments, error),
     })?;
     say(&format!("written to {path}\n"))

@@ -116,6 +116,15 @@ pub struct Block {
 }
 
 impl Block {
+    /// Whether some point may have another value of `quantity` than `only`.
+    pub fn has_other(&self, quantity: Quantity, only: f64) -> bool {
+        match self.axis(quantity).map(|axis| &axis.values) {
+            Some(Values::List(values)) => values.iter().any(|value| *value != only),
+            Some(Values::Linspace { .. } | Values::Geomspace { .. }) => true,
+            None => self.derived.iter().any(|derived| derived.quantity == quantity),
+        }
+    }
+
     /// The axis of `quantity`, if a factor contains it.
     pub fn axis(&self, quantity: Quantity) -> Option<&Axis> {
         self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)

@@ -11,7 +11,7 @@ use super::friction;
 use super::laws;
 use super::read;
 use super::spec::{Spec, TableSpec};
-use super::units::{UNIT_KEYS, doubt, units};
+use super::units::{UNIT_KEYS, doubt, doubtful_scales, units};
 use crate::file;
 use crate::grid::{Axis, Block, Factor, Grid, Quantity, RTOL, RowIndex, Scale, TooMany, Values};
 use crate::model::{Friction, Units};
@@ -163,7 +163,8 @@ impl Sweep {
         let requests = tables.into_iter().map(|table| request(table, &grid, &prefixes).map_err(placed));
         let requests = requests.collect::<Result<Vec<Request>, _>>()?;
         let optimum_rows = optimum_rows(&grid, &requests);
-        let mut warnings = Vec::new();
+        let mut warnings = doubtful_scales(&spec.model);
+        warnings.extend(unused(spec, &grid, &requests));
         for (prefix, block) in prefixes.iter().zip(&grid.blocks) {
             let axes = block.factors.iter().flat_map(|factor| &factor.axes);
             warnings.extend(axes.filter_map(|axis| doubt(prefix, &grid.units, axis)));
@@ -222,6 +223,34 @@ impl Request {
     pub fn needs_optimum(&self, grid: &Grid) -> bool {
         grid.blocks.iter().any(|block| self.table.needs_optimum(&self.projection, block))
     }
+}
+
+/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads.
+fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
+    let tables = |request: &Request| [Some(request.table), request.members.as_ref().and_then(|_| table::find("gap"))];
+    let tables: Vec<&Table> = requests.iter().flat_map(tables).flatten().collect();
+    // The best shortcut has the units of these axes.
+    let has_best = tables.iter().any(|table| table.name() == "best_cubic");
+    let of_table = |quantity: Quantity| tables.iter().any(|table| table.axes().contains(&quantity));
+    let top = (!spec.block.is_empty()).then_some(&spec.block[..]).map_or_else(|| vec![spec.top()], <[_]>::to_vec);
+    let mut warnings = Vec::new();
+    for (number, (written, block)) in top.iter().zip(&grid.blocks).enumerate() {
+        let prefix = if spec.block.is_empty() { String::new() } else { format!("block[{number}].") };
+        let expressions = block.derived.iter().map(|derived| &derived.expression).chain(&block.condition);
+        let read: Vec<Quantity> = expressions.flat_map(|expression| expression.reads()).collect();
+        for quantity in written.axes.keys().filter_map(|name| Quantity::from_name(name)) {
+            if of_table(quantity) || read.contains(&quantity) || (has_best && quantity.has_scale()) {
+                continue;
+            }
+            let others = table::ALL.into_iter().filter(|table| table.axes().contains(&quantity));
+            let others: Vec<&str> = others.map(|table| table.name()).collect();
+            let names: Vec<&str> = tables.iter().map(|table| table.name()).collect();
+            let (key, name) = (format!("{prefix}axes.{}", quantity.name()), names.join(", "));
+            let help = format!("remove it, or add a table that has it: {}", others.join(", "));
+            warnings.push(SpecError::new(key, format!("no effect on {name}"), "an axis of a requested table", help));
+        }
+    }
+    warnings
 }
 
 /// Rows that cover every optimal problem that is shared; `None` if there is none.
@@ -345,9 +374,15 @@ fn draft(
         return None;
     };
     let is_reduction_known = !faults.concern(&format!("{key}.reduce"));
-    let has_laws = blocks.iter().any(|block| block.held.contains(&Quantity::Law));
-    // A reduced table is one of ageing.
+    let has_ceiling = |block: &Block| block.has_other(Quantity::VelocityCeiling, f64::INFINITY);
+    let has_ceiling = blocks.iter().filter_map(|block| block.block.as_ref()).any(has_ceiling);
+    let has_laws = has_ceiling || blocks.iter().any(|block| block.held.contains(&Quantity::Law));
+    // A reduced table is one of ageing, without ceilings.
     let written = table::over(written, has_laws && spec.reduce.is_none());
+    if has_ceiling && spec.reduce.is_some() {
+        let (found, help) = ("a reduction supports no velocity ceiling", "remove the axis v_ceiling, or this key");
+        faults.push(SpecError::new(format!("{key}.reduce"), found, "no v_ceiling", help));
+    }
     let table = faults.take(reduced(written, &key, spec.reduce.as_deref()));
     for block in blocks {
         if let Some(grid) = &block.block {

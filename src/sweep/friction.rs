@@ -2,7 +2,7 @@
 
 use super::error::{SpecError, refuse};
 use super::spec::ModelSpec;
-use crate::grid::{Block, Quantity, Values};
+use crate::grid::{Block, Quantity};
 use crate::model::Friction;
 use crate::names::nearest;
 use crate::table::Table;
@@ -65,12 +65,7 @@ pub fn check(
         return refuse(format!("{key}.columns"), found, "the other columns", format!("remove \"{column}\""));
     }
     for (quantity, only, expected) in RESTRICTED.into_iter().filter(|(quantity, ..)| table.axes().contains(quantity)) {
-        let is_wrong = match block.axis(quantity).map(|axis| &axis.values) {
-            Some(Values::List(values)) => values.iter().any(|value| *value != only),
-            Some(Values::Linspace { .. } | Values::Geomspace { .. }) => true,
-            None => block.derived.iter().any(|derived| derived.quantity == quantity),
-        };
-        if is_wrong {
+        if block.has_other(quantity, only) {
             let found = format!("`{name}` supports no other {} with regularised friction", quantity.name());
             return refuse(key, found, expected, format!("remove the axis {}", quantity.name()));
         }

@@ -42,8 +42,9 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
                     return refuse("model.units", found, expected, help);
                 };
                 if !(value > 0.0 && value.is_finite()) {
-                    let (key, expected) = (format!("model.{name}"), format!("{name} > 0, finite, in {unit}"));
-                    return refuse(key, format!("{value:?} is out of range"), expected, "correct it");
+                    let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
+                    let (key, expected) = (format!("model.{name}"), format!("{name} > 0, finite{unit}"));
+                    return refuse(key, format!("{value:?} is out of range"), expected, "give a positive value");
                 }
                 values[place] = value;
             }
@@ -113,8 +114,25 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
     }
 }
 
-/// Velocity in m/s above which SI values are probably scaled values. Chosen: a hundred times the velocity of seismic waves, 1e4 m/s.
-const MAX_PLAUSIBLE_VELOCITY: f64 = 1e6;
+/// Velocity in m/s above which SI values are probably scaled values. Chosen: brakes slide at up to 50 m/s, faults at some 10 m/s.
+const MAX_PLAUSIBLE_VELOCITY: f64 = 50.0;
+
+/// Scales of SI units above which they are probably in other units. Chosen: faults slip over centimetres to reach steady friction, and friction
+/// coefficients are about 1.
+const MAX_PLAUSIBLE_SCALES: [(&str, f64, &str); 2] = [("l", 1.0, "m"), ("mu_0", 10.0, "1")];
+
+/// The warnings on scales of `model` that are probably in other units.
+pub fn doubtful_scales(model: &ModelSpec) -> Vec<SpecError> {
+    let given = [model.l, model.mu_0];
+    let pairs = MAX_PLAUSIBLE_SCALES.into_iter().zip(given);
+    let large = pairs.filter_map(|((name, most, unit), given)| Some((name, most, unit, given.filter(|x| *x > most)?)));
+    let warning = |(name, most, unit, value): (&str, f64, &str, f64)| {
+        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+        let expected = format!("usually below {most}{unit}");
+        SpecError::new(format!("model.{name}"), format!("{value}{unit} is unusually large"), expected, "check the unit")
+    };
+    large.map(warning).collect()
+}
 
 /// The warning that `axis`, whose key begins with `prefix`, is probably not in SI units, if so.
 pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
@@ -128,7 +146,7 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {
         let (key, expected) =
             (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, because of `units = \"si\"`");
-        SpecError::new(key, format!("{greatest:?} m/s is unphysically fast"), expected, PROBABLY_SCALED)
+        SpecError::new(key, format!("{greatest:?} m/s is unusually fast"), expected, PROBABLY_SCALED)
     })
 }
 

@@ -153,7 +153,7 @@ pub fn find(name: &str) -> Option<&'static Table> {
     ALL.into_iter().chain(REDUCED.map(|(_, table)| table)).find(|table| table.name() == name)
 }
 
-/// `table` over a grid: without the axis `law`, `gap` and `best_cubic` depend on neither the law nor the velocity ceiling.
+/// `table` over a grid: without the axis `law` and without a velocity ceiling, `gap` and `best_cubic` have neither axis.
 pub fn over(table: &'static Table, has_laws: bool) -> &'static Table {
     static GAP_OF_AGEING: Table = gap::GAP_OF_AGEING;
     static BEST_CUBIC_OF_AGEING: Table = best_cubic::BEST_CUBIC_OF_AGEING;

@@ -116,7 +116,7 @@ impl Sums {
 /// With `tau = 1 + a ln u + (b - a) ln theta = a (u - 1) - C theta` the rate `theta tau' = tau + a - b u` vanishes where
 /// `theta = (a - b) u/C`. There equation (2) of docs/derivations.md is `u - 1 - ln u = [1 + a - b + (b - a) ln((a - b)/C)]/b`,
 /// and `tau = b u - a` is a minimum for `(u - 1)(b - a) < 0` and a maximum for `(u - 1)(b - a) > 0`.
-pub(super) fn friction_range(law: &Law, c: f64, [start, end]: [&ArcPoint; 2]) -> [f64; 2] {
+pub(super) fn friction_range(law: &Law, c: f64, [start, end]: &[ArcPoint; 2]) -> [f64; 2] {
     let Law { a, b } = *law;
     let friction = |point: &ArcPoint| 1.0 + a * point.ln_u + (b - a) * point.ln_theta;
     let rate = |point: &ArcPoint| friction(point) + a - b * exp(point.ln_u);
@@ -233,21 +233,25 @@ impl Arc {
     /// Time, work and sensitivity to relative accuracy `tolerance`, with `SLOPES` also the sums for the derivatives of the work;
     /// `None` where the arc does not exist (`E < 0` on the way).
     pub fn sums<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
+        let (line, slice) = self.line();
         let steep = self.law.b - self.law.a;
-        let sums = match self.chart {
-            Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
-                let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
-                line.sums(tolerance, steep, |middle, half, rule| turning_kernel::<SLOPES>(&slice, middle, half, rule))
-            }
-            Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
-                let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
-                line.sums(tolerance, steep, |middle, half, rule| direct_kernel::<SLOPES>(&slice, middle, half, rule))
-            }
-        };
+        let sums = line.sums(tolerance, steep, |middle, half, rule| slice.sums::<SLOPES>(middle, half, rule));
         (sums.time.is_finite() && sums.work.is_finite()).then_some(sums)
     }
 
-    /// The turning chart as a line in `p`.
+    /// The arc as a line in the coordinate of its chart, `p` or `y`.
+    #[inline(always)]
+    fn line(&self) -> (Line<4>, Slice) {
+        match self.chart {
+            Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
+                self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares)
+            }
+            Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
+                self.direct_line(theta_a, z_a, friction_a, y_start, y_end)
+            }
+        }
+    }
+
     fn turning_line(
         &self,
         theta_h: f64,
@@ -255,7 +259,7 @@ impl Arc {
         x_start: f64,
         x_end: f64,
         x_squares: f64,
-    ) -> (Line<4>, TurningSlice) {
+    ) -> (Line<4>, Slice) {
         let Law { a, b } = self.law;
         let c_h = self.friction_at_turn(ln_theta_h);
         // Scale of the layer: w = X/layer near the turning point.
@@ -285,11 +289,10 @@ impl Arc {
             .map_or(f64::INFINITY, |x| asinh(x / sigma, (1.0 + x * x / (sigma * sigma)).sqrt()));
         let singular = [(-re, im), (far_re, far_im), (-far_re, far_im), (below.min(NO_SINGULARITY).copysign(low), 0.0)];
         let slice = TurningSlice { law: self.law, theta_h, ln_theta_h, c_h, sigma };
-        (Line { start, length, singular }, slice)
+        (Line { start, length, singular }, Slice::Turning(slice))
     }
 
-    /// The direct chart as a line in `y`.
-    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line<4>, DirectSlice) {
+    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line<4>, Slice) {
         let Law { a, b } = self.law;
         let (phi_a, slope_a) = phi_and_slope(z_a);
         let (low, c) = (y_start.min(y_end), a * phi_a - friction_a);
@@ -308,22 +311,13 @@ impl Arc {
             friction_a,
             sign: 1f64.copysign(z_a),
         };
-        (Line { start: y_start, length: y_end - y_start, singular }, slice)
+        (Line { start: y_start, length: y_end - y_start, singular }, Slice::Direct(slice))
     }
 
     /// The arc cut into equal pieces, in each of which few nodes yield the time from its ends to any place in it.
     pub fn pieces(&self) -> EqualSteps {
-        let (start, length, count, slice) = match self.chart {
-            Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
-                let (line, slice) = self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares);
-                (line.start, line.length, line.pieces(), Slice::Turning(slice))
-            }
-            Chart::Direct { theta_a, z_a, friction_a, y_start, y_end } => {
-                let (line, slice) = self.direct_line(theta_a, z_a, friction_a, y_start, y_end);
-                (line.start, line.length, line.pieces(), Slice::Direct(slice))
-            }
-        };
-        let mut pieces = EqualSteps { start, length, count, slice };
+        let (line, slice) = self.line();
+        let mut pieces = EqualSteps { start: line.start, length: line.length, count: line.pieces(), slice };
         // As in `sums`, more of them where friction falls below b - a.
         let (mut time, friction_min) = pieces.whole();
         while friction_min <= self.law.b - self.law.a && pieces.count < MAX_PIECES {
@@ -423,13 +417,25 @@ pub(super) struct EqualSteps {
     slice: Slice,
 }
 
+/// The constants of a chart's integrands.
 enum Slice {
     Turning(TurningSlice),
     Direct(DirectSlice),
 }
 
+impl Slice {
+    /// The sums of one panel.
+    #[inline(always)]
+    fn sums<const SLOPES: bool>(&self, middle: f64, half: f64, rule: &Rule) -> Sums {
+        match self {
+            Slice::Turning(slice) => panel_sums::<_, SLOPES>(slice, middle, half, rule),
+            Slice::Direct(slice) => panel_sums::<_, SLOPES>(slice, middle, half, rule),
+        }
+    }
+}
+
 /// A place on an arc.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ArcPoint {
     pub theta: f64,
     pub ln_theta: f64,
@@ -461,11 +467,7 @@ impl EqualSteps {
     /// The sums of the arc from one place to another of the same piece.
     pub fn sums(&self, from: f64, to: f64) -> Sums {
         let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
-        let rule = rule(PIECE_NODES);
-        match &self.slice {
-            Slice::Turning(slice) => turning_kernel::<false>(slice, middle, half, rule),
-            Slice::Direct(slice) => direct_kernel::<false>(slice, middle, half, rule),
-        }
+        self.slice.sums::<false>(middle, half, rule(PIECE_NODES))
     }
 
     /// The point at `place`, as in [`EqualSteps::time`].
@@ -642,18 +644,38 @@ fn direct_e(law: &Law, phi_a: f64, friction_a: f64, y: f64, grow: f64) -> f64 {
     phi_a * grow + ((law.b - law.a) * y - friction_a * exp_m1(y)) / law.a
 }
 
-/// Constants of the kernel of the turning chart.
-struct TurningSlice {
-    law: Law,
-    theta_h: f64,
-    ln_theta_h: f64,
-    c_h: f64,
-    sigma: f64,
-}
-
 /// Nodes that a kernel takes at once where there are as many: the operations of one half hide the latency of the other. Measured (`cargo bench
 /// --bench optimal`).
 const WIDE: usize = 2 * LANES;
+
+/// The integrands at `N` nodes, a multiple of the lanes, times their weights; all but `u` and the logarithms.
+struct Terms<const N: usize> {
+    time: [f64; N],
+    slip: [f64; N],
+    sensitivity: [f64; N],
+    swing: [f64; N],
+    u: [f64; N],
+    ln_u: [f64; N],
+    ln_theta: [f64; N],
+}
+
+impl<const N: usize> Terms<N> {
+    #[inline(always)]
+    fn new() -> Terms<N> {
+        let zero = [0.0; N];
+        Terms { time: zero, slip: zero, sensitivity: zero, swing: zero, u: zero, ln_u: zero, ln_theta: zero }
+    }
+}
+
+/// The integrands of a chart.
+trait Integrands {
+    fn law(&self) -> Law;
+
+    /// Units of time, work, sensitivity and swing per half panel.
+    fn units(&self) -> [f64; 4];
+
+    fn at<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N]) -> Terms<N>;
+}
 
 /// The sums of a kernel lane by lane.
 struct Tally {
@@ -665,16 +687,6 @@ struct Tally {
     sensitivity: Lanes,
     swing: Lanes,
     friction_min: Lanes,
-}
-
-/// The contribution of `N` nodes, a multiple of the lanes, to a [`Tally`].
-struct Terms<const N: usize> {
-    time: [f64; N],
-    lag: [f64; N],
-    work: [f64; N],
-    sensitivity: [f64; N],
-    swing: [f64; N],
-    friction: [f64; N],
 }
 
 impl Tally {
@@ -693,26 +705,24 @@ impl Tally {
     }
 
     #[inline(always)]
-    fn add<const N: usize>(&mut self, terms: &Terms<N>) {
+    fn add<const N: usize, const SLOPES: bool>(&mut self, law: &Law, terms: &Terms<N>) {
         for first in (0..N).step_by(LANES) {
             for i in 0..LANES {
-                self.time[i] += terms.time[first + i];
-                self.lag[i] += terms.lag[first + i];
-                self.work[i] += terms.work[first + i];
-                self.sensitivity[i] += terms.sensitivity[first + i];
-                self.swing[i] += terms.swing[first + i];
-                let (friction, least) = (terms.friction[first + i], self.friction_min[i]);
+                let at = first + i;
+                let friction = 1.0 + law.a * terms.ln_u[at] + (law.b - law.a) * terms.ln_theta[at];
+                self.time[i] += terms.time[at];
+                self.lag[i] += terms.time[at] * terms.u[at];
+                self.work[i] += terms.slip[at] * friction;
+                if SLOPES {
+                    self.slopes[0][i] += terms.slip[at] * (terms.ln_u[at] - terms.ln_theta[at]);
+                    self.slopes[1][i] += terms.slip[at] * terms.ln_theta[at];
+                }
+                self.sensitivity[i] += terms.sensitivity[at];
+                self.swing[i] += terms.swing[at];
+                let least = self.friction_min[i];
                 self.friction_min[i] = if friction < least { friction } else { least };
             }
         }
-    }
-}
-
-impl<const N: usize> Terms<N> {
-    #[inline(always)]
-    fn new() -> Terms<N> {
-        let zero = [0.0; N];
-        Terms { time: zero, lag: zero, work: zero, sensitivity: zero, swing: zero, friction: zero }
     }
 }
 
@@ -720,45 +730,59 @@ impl<const N: usize> Terms<N> {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn turning_kernel<const SLOPES: bool>(arc: &TurningSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
+fn panel_sums<I: Integrands, const SLOPES: bool>(integrands: &I, middle: f64, half: f64, rule: &Rule) -> Sums {
     let mut tally = Tally::new();
+    let law = integrands.law();
     let (x, x_last) = rule.x.as_chunks::<WIDE>();
     let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
     for (x, weight) in x.iter().zip(weight) {
-        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
+        tally.add::<_, SLOPES>(&law, &integrands.at(middle, half, x, weight));
     }
     for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
-        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
+        tally.add::<_, SLOPES>(&law, &integrands.at(middle, half, x, weight));
     }
-    let scale = 2.0 * arc.sigma * half;
+    let [time, work, sensitivity, swing] = integrands.units().map(|unit| unit * half);
     Sums {
-        time: scale * arc.theta_h * fold(&tally.time),
-        lag: scale * arc.theta_h * fold(&tally.lag),
-        work: scale * fold(&tally.work),
-        creep: if SLOPES { scale * fold(&tally.slopes[0]) } else { 0.0 },
-        state: if SLOPES { scale * fold(&tally.slopes[1]) } else { 0.0 },
-        sensitivity: scale * arc.theta_h * fold(&tally.sensitivity),
-        swing: scale * arc.theta_h * arc.theta_h * fold(&tally.swing),
+        time: time * fold(&tally.time),
+        lag: time * fold(&tally.lag),
+        work: work * fold(&tally.work),
+        creep: if SLOPES { work * fold(&tally.slopes[0]) } else { 0.0 },
+        state: if SLOPES { work * fold(&tally.slopes[1]) } else { 0.0 },
+        sensitivity: sensitivity * fold(&tally.sensitivity),
+        swing: swing * fold(&tally.swing),
         friction_min: least(&tally.friction_min),
         nodes: rule.x.len() as u32,
     }
 }
 
-impl TurningSlice {
-    /// Adds the terms of `N` nodes, a multiple of the lanes.
+/// Constants of the turning chart.
+struct TurningSlice {
+    law: Law,
+    theta_h: f64,
+    ln_theta_h: f64,
+    c_h: f64,
+    sigma: f64,
+}
+
+impl Integrands for TurningSlice {
     #[inline(always)]
-    fn add<const N: usize, const SLOPES: bool>(
-        &self,
-        middle: f64,
-        half: f64,
-        x: &[f64; N],
-        weight: &[f64; N],
-        tally: &mut Tally,
-    ) {
+    fn law(&self) -> Law {
+        self.law
+    }
+
+    #[inline(always)]
+    fn units(&self) -> [f64; 4] {
+        let (unit, theta) = (2.0 * self.sigma, self.theta_h);
+        [unit * theta, unit, unit * theta, unit * theta * theta]
+    }
+
+    #[inline(always)]
+    fn at<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N]) -> Terms<N> {
         let Law { a, b } = self.law;
         let (double, bend, slope) = (2.0 / a, (a - b) * (2.0 / a), (b - a) / a);
         let (mut w, mut om, mut inverse_x2) = ([0.0; N], [0.0; N], [0.0; N]);
-        let (mut cosh, mut shrink, mut ln_theta) = ([0.0; N], [0.0; N], [0.0; N]);
+        let (mut cosh, mut shrink) = ([0.0; N], [0.0; N]);
+        let mut terms = Terms::new();
         for i in 0..N {
             let q = exp(middle + half * x[i]);
             let inverse = 1.0 / q;
@@ -769,35 +793,27 @@ impl TurningSlice {
             shrink[i] = 1.0 / (1.0 + x2);
             inverse_x2[i] = 1.0 / x2;
             let l = ln_grown(x2, shrink[i]);
-            ln_theta[i] = self.ln_theta_h - l;
+            terms.ln_theta[i] = self.ln_theta_h - l;
             om[i] = (double * self.c_h * shrink[i] + bend * (l * inverse_x2[i])).sqrt();
             w[i] = big_x * om[i];
         }
         let found = turning_lanes(&w);
-        let mut terms = Terms::<N>::new();
         for i in 0..N {
             // X/(u - 1), regular at the turning point.
             let ratio = found.under[i] / (om[i] * found.over[i]);
             let g = weight[i] * cosh[i] * ratio * shrink[i];
-            let u = found.u[i];
-            let bent = u * ratio * ratio * shrink[i];
-            terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
+            let bent = found.u[i] * ratio * ratio * shrink[i];
             terms.time[i] = g * shrink[i];
-            terms.lag[i] = terms.time[i] * u;
-            let slip = g * u;
-            terms.work[i] = slip * terms.friction[i];
-            if SLOPES {
-                tally.slopes[0][i % LANES] += slip * (found.ln_u[i] - ln_theta[i]);
-                tally.slopes[1][i % LANES] += slip * ln_theta[i];
-            }
+            terms.slip[i] = g * found.u[i];
             terms.sensitivity[i] = terms.time[i] * (1.0 - bent * slope);
             terms.swing[i] = terms.time[i] * bent * inverse_x2[i];
         }
-        tally.add(&terms);
+        (terms.u, terms.ln_u) = (found.u, found.ln_u);
+        terms
     }
 }
 
-/// Constants of the kernel of the direct chart.
+/// Constants of the direct chart.
 struct DirectSlice {
     law: Law,
     theta_a: f64,
@@ -808,69 +824,36 @@ struct DirectSlice {
     sign: f64,
 }
 
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-fn direct_kernel<const SLOPES: bool>(arc: &DirectSlice, middle: f64, half: f64, rule: &Rule) -> Sums {
-    let mut tally = Tally::new();
-    let (x, x_last) = rule.x.as_chunks::<WIDE>();
-    let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
-    for (x, weight) in x.iter().zip(weight) {
-        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
-    }
-    for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
-        arc.add::<_, SLOPES>(middle, half, x, weight, &mut tally);
-    }
-    let sensitivity = fold(&tally.sensitivity);
-    Sums {
-        time: half * arc.theta_a * fold(&tally.time),
-        lag: half * arc.theta_a * fold(&tally.lag),
-        work: half * fold(&tally.work),
-        creep: if SLOPES { half * fold(&tally.slopes[0]) } else { 0.0 },
-        state: if SLOPES { half * fold(&tally.slopes[1]) } else { 0.0 },
-        sensitivity: half * arc.theta_a * arc.slope_a * sensitivity,
-        swing: -half * arc.theta_a * arc.theta_a * sensitivity,
-        friction_min: least(&tally.friction_min),
-        nodes: rule.x.len() as u32,
-    }
-}
-
-impl DirectSlice {
-    /// Adds the terms of `N` nodes, a multiple of the lanes.
+impl Integrands for DirectSlice {
     #[inline(always)]
-    fn add<const N: usize, const SLOPES: bool>(
-        &self,
-        middle: f64,
-        half: f64,
-        x: &[f64; N],
-        weight: &[f64; N],
-        tally: &mut Tally,
-    ) {
-        let Law { a, b } = self.law;
-        let (mut w, mut grow, mut ln_theta) = ([0.0; N], [0.0; N], [0.0; N]);
+    fn law(&self) -> Law {
+        self.law
+    }
+
+    #[inline(always)]
+    fn units(&self) -> [f64; 4] {
+        let theta = self.theta_a;
+        [theta, 1.0, theta * self.slope_a, -theta * theta]
+    }
+
+    #[inline(always)]
+    fn at<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N]) -> Terms<N> {
+        let (mut w, mut grow) = ([0.0; N], [0.0; N]);
+        let mut terms = Terms::new();
         for i in 0..N {
             let y = middle + half * x[i];
             grow[i] = exp(y);
-            ln_theta[i] = self.ln_theta_a + y;
+            terms.ln_theta[i] = self.ln_theta_a + y;
             w[i] = self.sign * (2.0 * direct_e(&self.law, self.phi_a, self.friction_a, y, grow[i])).sqrt();
         }
         let found = turning_lanes(&w);
-        let mut terms = Terms::<N>::new();
         for i in 0..N {
             let inverse = 1.0 / found.excess[i];
-            let u = found.u[i];
-            terms.friction[i] = 1.0 + a * found.ln_u[i] + (b - a) * ln_theta[i];
             terms.time[i] = -weight[i] * grow[i] * inverse;
-            terms.lag[i] = terms.time[i] * u;
-            let slip = -weight[i] * inverse * u;
-            terms.work[i] = slip * terms.friction[i];
-            if SLOPES {
-                tally.slopes[0][i % LANES] += slip * (found.ln_u[i] - ln_theta[i]);
-                tally.slopes[1][i % LANES] += slip * ln_theta[i];
-            }
-            terms.sensitivity[i] = -terms.time[i] * grow[i] * u * inverse * inverse;
+            terms.slip[i] = -weight[i] * inverse * found.u[i];
+            terms.sensitivity[i] = -terms.time[i] * grow[i] * found.u[i] * inverse * inverse;
         }
-        tally.add(&terms);
+        (terms.swing, terms.u, terms.ln_u) = (terms.sensitivity, found.u, found.ln_u);
+        terms
     }
 }

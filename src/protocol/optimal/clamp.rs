@@ -18,6 +18,7 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 pub(super) struct Fall {
     law: Law,
     pub theta_top: f64,
+    ln_theta_top: f64,
     /// `a E` at the top; 0 where theta turns there.
     excess: f64,
     /// Friction at the top with `u = 1`.
@@ -160,8 +161,7 @@ pub(super) enum ClampedPiece {
         turned: f64,
         /// Whether it starts or ends where the extremal does.
         at: [bool; 2],
-        /// `(theta, ln u)` at both ends.
-        ends: [(f64, f64); 2],
+        ends: [ArcPoint; 2],
     },
     /// A part on a ceiling.
     Ceiling { arc: CeilingArc, gap: Gap },
@@ -227,7 +227,7 @@ pub(super) struct Path {
     pieces: [Option<ClampedPiece>; Path::MAX_PIECES],
     count: usize,
     /// Times on the ceilings of the velocity and of friction.
-    times: (f64, f64),
+    pub times: (f64, f64),
     /// Derivative of the time with respect to the parameter where quadratures do not resolve it.
     rate: Option<f64>,
 }
@@ -250,7 +250,6 @@ impl Path {
     const MAX_PIECES: usize = 5;
 
     /// A free extremal as one piece.
-    #[inline(always)]
     pub fn of(problem: &Problem, extremal: Extremal) -> Path {
         let mut path = Path::new(extremal);
         path.push(whole(problem, &extremal));
@@ -388,9 +387,30 @@ impl Path {
         })
     }
 
+    /// The path for reading.
+    pub fn view(&self) -> PathView<'_> {
+        PathView { extremal: &self.extremal, pieces: &self.pieces, times: self.times }
+    }
+}
+
+/// A path that is borrowed: a free extremal needs no room for five pieces.
+pub(super) struct PathView<'a> {
+    pub extremal: &'a Extremal,
+    pieces: &'a [Option<ClampedPiece>],
     /// Times on the ceilings of the velocity and of friction.
-    pub fn times(&self) -> (f64, f64) {
-        self.times
+    pub times: (f64, f64),
+}
+
+impl PathView<'_> {
+    /// Reads a free extremal.
+    #[inline(always)]
+    pub fn of_free<T>(problem: &Problem, extremal: &Extremal, read: impl FnOnce(&PathView) -> T) -> T {
+        read(&PathView { extremal, pieces: &[Some(whole(problem, extremal))], times: (0.0, 0.0) })
+    }
+
+    /// The pieces in their order.
+    pub fn pieces(&self) -> impl Iterator<Item = &ClampedPiece> {
+        self.pieces.iter().flatten()
     }
 }
 
@@ -402,20 +422,20 @@ pub(super) struct FrictionRange {
     pub greatest: f64,
 }
 
-impl Path {
+impl PathView<'_> {
     /// Friction along the pieces and at the floor; `met` is the least at nodes.
     #[inline(always)]
     pub fn friction(&self, problem: &Problem, met: f64) -> FrictionRange {
-        let (law, c) = (problem.law, self.extremal.arc.c());
+        let (law, c) = (&problem.law, self.extremal.arc.c());
         let waits = self.extremal.time_at_floor > 0.0;
         let least = if waits { met.min(1.0 + law.b * problem.from.ln) } else { met };
         let mut range = FrictionRange { least, least_steady: f64::INFINITY, greatest: f64::NEG_INFINITY };
         for piece in self.pieces() {
-            let ends = piece.ends().map(|(theta, ln_u)| ArcPoint { theta, ln_theta: ln(theta), ln_u });
+            let ends = piece.ends();
             let steady = |end: &ArcPoint| 1.0 + (law.b - law.a) * end.ln_theta;
             let at = |end: &ArcPoint| steady(end) + law.a * end.ln_u;
             let [low, high] = match piece.kind() {
-                ArcKind::Free => friction_range(&law, c, [&ends[0], &ends[1]]),
+                ArcKind::Free => friction_range(law, c, &ends),
                 _ => [at(&ends[0]).min(at(&ends[1])), at(&ends[0]).max(at(&ends[1]))],
             };
             range.least = range.least.min(low);
@@ -430,12 +450,15 @@ impl Path {
 }
 
 impl ClampedPiece {
-    /// `(theta, ln u)` at both ends.
-    pub fn ends(&self) -> [(f64, f64); 2] {
+    /// The start and the end.
+    #[inline(always)]
+    pub fn ends(&self) -> [ArcPoint; 2] {
         match self {
             ClampedPiece::Free { ends, .. } => *ends,
             ClampedPiece::Ceiling { arc, .. } => {
-                let (high, low) = ((arc.theta_hi, arc.z_hi), (arc.theta_hi * exp(-arc.length), arc.z_lo));
+                let high = ArcPoint { theta: arc.theta_hi, ln_theta: ln(arc.theta_hi), ln_u: arc.z_hi };
+                let (theta, ln_theta) = (arc.theta_hi * exp(-arc.length), high.ln_theta - arc.length);
+                let low = ArcPoint { theta, ln_theta, ln_u: arc.z_lo };
                 if arc.falls() { [high, low] } else { [low, high] }
             }
         }
@@ -456,6 +479,7 @@ pub(super) fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Ex
     Some(Fall {
         law,
         theta_top,
+        ln_theta_top,
         excess,
         friction: 1.0 + (law.b - law.a) * ln_theta_top,
         depth,
@@ -467,9 +491,18 @@ pub(super) fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Ex
 
 /// A free extremal as one piece.
 fn whole(problem: &Problem, extremal: &Extremal) -> ClampedPiece {
-    let ends = [(extremal.theta_s, extremal.start), (problem.to.theta, extremal.end)];
     let [start, end] = extremal.end_terms();
+    let ends = ends_of(problem, extremal);
     ClampedPiece::Free { arc: extremal.arc, turned: start + end, at: [true, true], ends }
+}
+
+/// The start and the end of the arc of an extremal.
+#[inline(always)]
+fn ends_of(problem: &Problem, extremal: &Extremal) -> [ArcPoint; 2] {
+    // Where the arc leaves the floor, u = theta.
+    let ln_theta = if extremal.time_at_floor > 0.0 { extremal.start } else { problem.from.ln };
+    let start = ArcPoint { theta: extremal.theta_s, ln_theta, ln_u: extremal.start };
+    [start, ArcPoint { theta: problem.to.theta, ln_theta: problem.to.ln, ln_u: extremal.end }]
 }
 
 /// The free part of an extremal between two depths; from the start if the first is 0.
@@ -497,11 +530,11 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
     let switch = |d: f64| {
         let kind = binding(fall, d);
         let z = fall.cap(kind, d);
-        (fall.theta_top * exp(-d), z)
+        ArcPoint { theta: fall.theta_top * exp(-d), ln_theta: fall.ln_theta_top - d, ln_u: z }
     };
-    let start = if first { (extremal.theta_s, extremal.start) } else { switch(from) };
-    let end = if last { (problem.to.theta, extremal.end) } else { switch(to) };
-    let swing = |(theta, z): (f64, f64)| theta / exp_m1(z);
+    let [start, end] = ends_of(problem, extremal);
+    let (start, end) = (if first { start } else { switch(from) }, if last { end } else { switch(to) });
+    let swing = |at: ArcPoint| at.theta / exp_m1(at.ln_u);
     let [at_start, at_end] = extremal.end_terms();
     let turned = if last { at_end } else { swing(end) } + if first { at_start } else { -swing(start) };
     ClampedPiece::Free { arc: Arc { law, chart }, turned, at: [first, last], ends: [start, end] }

@@ -3,7 +3,7 @@
 
 use super::arc::phi;
 use super::ceiling::Ceilings;
-use super::clamp::{Path, PathSums, Switch, Switches, falling_part};
+use super::clamp::{Path, PathSums, PathView, Switch, Switches, falling_part};
 use super::extremal::{Extremal, Problem};
 use super::guess::{Guess, QUADRATURE_ERROR, capped_guess};
 use super::lifetime::Lifetime;
@@ -197,7 +197,7 @@ fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stat
             stats += SolverStats { quadratures: 1, nodes: sums.nodes };
             sat = (sat - turn.time(&sums)).max(0.0);
             let turn = path.insert(Path::of(problem, turn));
-            search::read(problem, ceilings, turn, turn.extremal.work(problem, &sums), sums.friction_min)
+            search::read(problem, ceilings, &turn.view(), turn.extremal.work(problem, &sums), sums.friction_min)
         });
         let Some((of_turn, value)) = read else { return Constrained::without_numbers(Status::NotConverged, stats) };
         let Some(value) = value else { return Constrained::without_numbers(of_turn, stats) };
@@ -285,7 +285,7 @@ impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
 
     /// Arcs on a ceiling change much with the parameter, those at a peak of friction by the square root.
     fn short_arc(&self, _: f64, path: &Path) -> Option<ShortArc> {
-        let (of_v, of_tau) = path.times();
+        let (of_v, of_tau) = path.times;
         let short = |time: f64| if time > 0.0 && time < SHORT_CEILING_TIME * self.t_f { time } else { f64::INFINITY };
         let time = short(of_v + of_tau).min(short(path.extremal.time_at_floor));
         let part = time / (SHORT_CEILING_TIME * self.t_f);
@@ -305,8 +305,8 @@ impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
         (work + floor::work(&self.problem.law, self.problem.from, path.extremal.time_at_floor), nodes)
     }
 
-    fn in_pieces<T>(&self, path: &Path, read: impl FnOnce(&Path) -> T) -> T {
-        read(path)
+    fn in_pieces<T>(&self, path: &Path, read: impl FnOnce(&PathView) -> T) -> T {
+        read(&path.view())
     }
 }
 

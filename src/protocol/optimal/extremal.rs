@@ -236,14 +236,14 @@ impl Problem {
     /// turning point down to `theta_1`.
     fn after_hold(&self, since: Lifetime, fall: f64, time: f64, unit: f64) -> Option<Extremal> {
         let law = self.law;
-        let released = since.aged(time);
+        let (released, growth) = since.aged_by(time);
         let Lifetime { theta, rest, ln: z } = released;
         let excess = law.a * phi(z);
         let friction = 1.0 + (law.b - law.a) * z;
         let xi = turning_distance(&law, excess, friction - excess)?;
         let (theta_h, ln_theta_h) = (theta * (1.0 + xi), z + ln_1p(xi));
         // theta_c/theta_1 - 1.
-        let fall = fall + since.growth(time) / self.to.theta;
+        let fall = fall + growth / self.to.theta;
         let x_squares = (1.0 + xi) * fall;
         let (x_start, x_end) = (-xi.sqrt(), (xi + x_squares).sqrt());
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
@@ -484,6 +484,7 @@ impl Extremal {
     }
 
     /// What the start and the end of the arc add to the sums over free pieces.
+    #[inline(always)]
     pub fn end_terms(&self) -> [f64; 2] {
         match self.rate {
             Rate::Floor { inner, .. } | Rate::Turning { inner, .. } => [0.0, inner],
@@ -493,6 +494,7 @@ impl Extremal {
     }
 
     /// Derivative of the total time with respect to the parameter.
+    #[inline(always)]
     pub fn rate_of(&self, free: &FreeSums) -> f64 {
         let inside = |gain: f64| gain * (free.sensitivity + free.ends);
         match self.rate {

@@ -1,5 +1,6 @@
 //! The closed-loop law: what the optimal protocol does now, from the contact lifetime and the time that is left.
 
+use super::arc::ArcPoint;
 use super::ceiling::Ceilings;
 use super::constrained::{self, Constrained};
 use super::extremal::Problem;
@@ -58,7 +59,7 @@ fn waiting_gain(problem: &Problem, path: &super::clamp::Path) -> Option<f64> {
         return Some(0.0);
     }
     let Law { a, b } = problem.law;
-    let (theta, z) = path.pieces().next()?.ends()[0];
+    let ArcPoint { theta, ln_u: z, .. } = path.pieces().next()?.ends()[0];
     let friction = 1.0 + a * z + (b - a) * crate::numerics::elementary::ln(theta);
     let excess = crate::numerics::elementary::exp_m1(z);
     Some(-exp(z) / theta / excess * (friction - b + a) / (a * theta))

@@ -1,6 +1,6 @@
 //! The state variable theta with its distance from 1, the limit of ageing at `v = 1`.
 
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp_and_m1, exp_m1, ln, ln_1p};
 
 /// A value of the state variable; `theta` and `1 - theta` are each known to full relative accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +32,13 @@ impl Lifetime {
 
     /// The state after `time` at `v = 1`.
     pub fn aged(&self, time: f64) -> Lifetime {
-        Lifetime::with(self.theta + self.growth(time), self.rest * exp(-time))
+        self.aged_by(time).0
+    }
+
+    /// The state after `time` at `v = 1`, and by how much it has grown.
+    pub fn aged_by(&self, time: f64) -> (Lifetime, f64) {
+        let (left, lost) = exp_and_m1(-time);
+        let growth = -self.rest * lost;
+        (Lifetime::with(self.theta + growth, self.rest * left), growth)
     }
 }

@@ -28,7 +28,7 @@ use extremal::Problem;
 use guess::Guess;
 use lifetime::Lifetime;
 use motion::OptimalMotion;
-use search::Time;
+use search::{FreeOptimum, Time};
 
 pub use bounds::Bounds;
 pub use feasible::{feasible_times, least_tau_ceiling, least_v_ceiling, obstacle};
@@ -203,12 +203,11 @@ pub enum Obstacle {
 /// `tau < 0`; an extremal that falls below the bound where it is unproven has no numbers.
 pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol: f64) -> Solved<Optimum> {
     let bounds = bounds.into();
-    let Some((problem, ceilings)) = posed(transition, t_f, &bounds) else { return INFEASIBLE };
-    let time = Time::since(&problem, t_f);
     if !bounds.has_ceilings() {
-        return search::free(&problem, time, rtol, &Guess::of(&problem, time.beyond)).0;
+        return free(transition, t_f, bounds.floor, rtol).map_or(INFEASIBLE, |(_, (solved, _))| solved);
     }
-    constrained::find(&problem, &ceilings, time, rtol).solved
+    let Some((problem, ceilings)) = posed(transition, t_f, &bounds) else { return INFEASIBLE };
+    constrained::find(&problem, &ceilings, Time::since(&problem, t_f), rtol).solved
 }
 
 const INFEASIBLE: Solved<Optimum> =
@@ -230,6 +229,13 @@ pub fn slopes(
     let tolerance = search::quadrature_tolerance(rtol);
     let slopes = slopes::slopes(&problem, path.as_ref(), sitting, tolerance, &mut solved.stats);
     (solved, slopes)
+}
+
+/// The problem without ceilings, its optimum and the extremal of that; `None` outside the domain.
+fn free(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Option<(Problem, FreeOptimum)> {
+    let problem = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite())?;
+    let time = Time::since(&problem, t_f);
+    Some((problem, search::free(&problem, time, rtol, &Guess::of(&problem, time.beyond))))
 }
 
 /// The problem and its ceilings; `None` outside the domain.
@@ -270,11 +276,9 @@ fn motion_of(
 
 /// The optimal protocol and its path.
 pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> (Solved<Optimum>, Option<Route>) {
-    let Some(problem) = Problem::of(transition, bounded).filter(|_| t_f > 0.0 && t_f.is_finite()) else {
-        return (Solved { status: Status::Infeasible, value: None, stats: SolverStats::default() }, None);
+    let Some((problem, (solved, member))) = free(transition, t_f, bounded, rtol.min(MOTION_RTOL)) else {
+        return (INFEASIBLE, None);
     };
-    let time = Time::since(&problem, t_f);
-    let (solved, member) = search::free(&problem, time, rtol.min(MOTION_RTOL), &Guess::of(&problem, time.beyond));
     (solved, solved.value.map(|_| Route::new(&problem, t_f, member.map(|(extremal, _)| extremal))))
 }
 

@@ -159,7 +159,7 @@ impl Route {
         if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
             let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
             let (first, last) = (arc.pieces.at(start), arc.pieces.at(end));
-            least = least.min(friction_range(&self.law, arc.c, [&first, &last])[0]);
+            least = least.min(friction_range(&self.law, arc.c, &[first, last])[0]);
         }
         least
     }

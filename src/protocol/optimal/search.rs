@@ -1,12 +1,12 @@
 //! The search for the extremal that takes a given time, and what is read off it.
 
-use super::arc::Sums;
+use super::arc::{ArcPoint, Sums};
 use super::ceiling::Ceilings;
-use super::clamp::Path;
+use super::clamp::PathView;
 use super::extremal::{Extremal, MAX_LN_U, Problem};
 use super::guess::Guess;
 use super::{ArcKind, Optimum, Strategy, floor};
-use crate::numerics::elementary::{exp, ln};
+use crate::numerics::elementary::exp;
 use crate::numerics::root::{Probe, newton_in_pieces};
 use crate::protocol::{Solved, SolverStats, Status};
 
@@ -72,7 +72,7 @@ pub(super) trait Family {
     fn bound_work(&self, path: &Self::Path) -> (f64, u32);
 
     /// Reads a path with its pieces.
-    fn in_pieces<T>(&self, path: &Self::Path, read: impl FnOnce(&Path) -> T) -> T;
+    fn in_pieces<T>(&self, path: &Self::Path, read: impl FnOnce(&PathView) -> T) -> T;
 }
 
 /// What one quadrature finds.
@@ -244,13 +244,11 @@ impl Time {
     }
 }
 
-/// The optimum without ceilings, with its extremal and parameter; without them where it is the floor arc alone.
-pub(super) fn free(
-    problem: &Problem,
-    time: Time,
-    rtol: f64,
-    guess: &Guess,
-) -> (Solved<Optimum>, Option<(Extremal, f64)>) {
+/// An optimum without ceilings, with its extremal and parameter; without them where it is the floor arc alone.
+pub(super) type FreeOptimum = (Solved<Optimum>, Option<(Extremal, f64)>);
+
+/// The optimum without ceilings.
+pub(super) fn free(problem: &Problem, time: Time, rtol: f64, guess: &Guess) -> FreeOptimum {
     let Time { whole: t_f, beyond, doubt } = time;
     let stats = SolverStats::default();
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
@@ -282,21 +280,21 @@ fn failure(problem: &Problem, ceilings: &Ceilings, met: f64) -> Status {
 pub(super) fn read(
     problem: &Problem,
     ceilings: &Ceilings,
-    path: &Path,
+    path: &PathView,
     work: f64,
     met: f64,
 ) -> Option<(Status, Option<Optimum>)> {
-    let Extremal { time_at_floor, ref arc, .. } = path.extremal;
+    let &Extremal { time_at_floor, ref arc, .. } = path.extremal;
     let (first, last) = path.pieces().next().zip(path.pieces().last())?;
-    let velocity = |(theta, z): (f64, f64), kind: ArcKind| match kind {
+    let velocity = |&ArcPoint { theta, ln_theta, ln_u: z }: &ArcPoint, kind: ArcKind| match kind {
         ArcKind::VCeiling => ceilings.v,
         // exp(z) would lose digits below the normal numbers.
-        _ if z < -MAX_LN_U => exp(z - ln(theta)),
+        _ if z < -MAX_LN_U => exp(z - ln_theta),
         _ => exp(z) / theta,
     };
     let held = time_at_floor > 0.0;
-    let v_start = if held { 1.0 } else { velocity(first.ends()[0], first.kind()) };
-    let v_end = velocity(last.ends()[1], last.kind());
+    let v_start = if held { 1.0 } else { velocity(&first.ends()[0], first.kind()) };
+    let v_end = velocity(&last.ends()[1], last.kind());
     let friction = path.friction(problem, met);
     // A ceiling that hardly binds is met to the accuracy of the search.
     let most = ceilings.v * (1.0 + ROUNDING_AT_CEILING);
@@ -306,10 +304,10 @@ pub(super) fn read(
     }
     // Just off the bound, rounding may take a velocity below it; further below there is no protocol on the bound at all.
     let below = problem.bounded && v_start.min(v_end) < 1.0 - ROUNDING;
-    let doubtful = below || (friction.least_steady <= problem.unique_above() && !is_proven(problem, &path.extremal));
-    let (of_v, of_tau) = path.times();
+    let doubtful = below || (friction.least_steady <= problem.unique_above() && !is_proven(problem, path.extremal));
+    let (of_v, of_tau) = path.times;
     // Where friction is this low the velocity may fall along an arc: below the floor, or from above the ceiling.
-    let dips = || problem.bounded && of_v + of_tau == 0.0 && velocity_range(&path.extremal)[0] < 1.0 - ROUNDING;
+    let dips = || problem.bounded && of_v + of_tau == 0.0 && velocity_range(path.extremal)[0] < 1.0 - ROUNDING;
     if below || v_start > if doubtful { ceilings.v } else { most } || (doubtful && dips()) {
         return Some((Status::Unproven, None));
     }
@@ -461,8 +459,9 @@ impl Family for Extremals<'_> {
         (floor::work(&self.problem.law, self.problem.from, path.time_at_floor), 0)
     }
 
-    fn in_pieces<T>(&self, path: &Extremal, read: impl FnOnce(&Path) -> T) -> T {
-        read(&Path::of(self.problem, *path))
+    #[inline(always)]
+    fn in_pieces<T>(&self, path: &Extremal, read: impl FnOnce(&PathView) -> T) -> T {
+        PathView::of_free(self.problem, path, read)
     }
 }
 

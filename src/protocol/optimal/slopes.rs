@@ -7,7 +7,7 @@ use super::extremal::Problem;
 use super::lifetime::Lifetime;
 use super::{ArcKind, Slopes, floor, motion};
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1};
 use crate::numerics::turning::turning;
 use crate::protocol::SolverStats;
 
@@ -94,12 +94,12 @@ pub(super) fn costate(problem: &Problem, path: &Path) -> Option<f64> {
 
 /// `(tau v + C)/(u - 1) = [tau + a - G/(u - 1)]/theta` at the start or at the end of a piece of a path of constant `c`.
 fn pressure(law: Law, c: f64, piece: &ClampedPiece, at_end: bool) -> f64 {
-    let (theta, z) = piece.ends()[usize::from(at_end)];
+    let at = piece.ends()[usize::from(at_end)];
     match piece {
-        ClampedPiece::Free { .. } => costate_off_bounds(&law, c, &ArcPoint { theta, ln_theta: ln(theta), ln_u: z }),
+        ClampedPiece::Free { .. } => costate_off_bounds(&law, c, &at),
         ClampedPiece::Ceiling { arc, gap } => {
-            let friction = 1.0 + law.a * z + (law.b - law.a) * ln(theta);
-            (friction + law.a - gap.value(arc.end(arc.falls() != at_end)) / exp_m1(z)) / theta
+            let friction = 1.0 + law.a * at.ln_u + (law.b - law.a) * at.ln_theta;
+            (friction + law.a - gap.value(arc.end(arc.falls() != at_end)) / exp_m1(at.ln_u)) / at.theta
         }
     }
 }
@@ -124,7 +124,7 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
         return Some(0.0);
     }
     let first = path.pieces().next()?;
-    let (theta, z) = first.ends()[0];
+    let ArcPoint { theta, ln_theta, ln_u: z } = first.ends()[0];
     let v = exp(z) / theta;
     match first.kind() {
         ArcKind::VCeiling => return Some(0.0),
@@ -135,12 +135,12 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
     for (i, piece) in path.pieces().enumerate() {
         if let ClampedPiece::Free { arc, ends, .. } = piece {
             let sums = arc.sums::<false>(tolerance)?;
-            let edge = |(theta, z): (f64, f64)| theta / exp_m1(z);
+            let edge = |at: ArcPoint| at.theta / exp_m1(at.ln_u);
             at_fixed_x += sums.sensitivity + edge(ends[1]) - if i == 0 { 0.0 } else { edge(ends[0]) };
             swing += sums.swing;
         }
     }
-    let friction = 1.0 + a * z + (b - a) * ln(theta);
+    let friction = 1.0 + a * z + (b - a) * ln_theta;
     match path.extremal.arc.chart {
         Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares }
             if x_start * x_end <= 0.0 || x_squares.abs() > x_start.abs().min(x_end.abs()).powi(2) =>
