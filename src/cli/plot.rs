@@ -139,7 +139,7 @@ impl Arguments {
                 "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
             )));
         }
-        let mut damage = None;
+        let (mut damage, mut pictures) = (None, 0);
         for table in &tables {
             let drawing = format!("drawing {table}");
             let drawn = waiting(&Wait::new(&drawing), || source.figure(table, &request)).map_err(Failure::from);
@@ -157,8 +157,13 @@ impl Arguments {
             };
             let path = self.write(&figure, &format!("{}-{table}", source.manifest.name), place)?;
             say(&format!("{table}: written to {}\n{}", path.display(), remarks(&figure)))?;
+            pictures += 1;
         }
-        damage.map_or(Ok(()), Err)
+        match damage {
+            Some(failure) => Err(failure),
+            None if pictures == 0 => Err(wrong(format!("{}: no table has a picture", path.display()))),
+            None => Ok(()),
+        }
     }
 
     /// The first given argument among `first` and the arguments that apply to one table.

@@ -72,7 +72,7 @@ pub struct Arguments {
     /// Velocity after the protocol, in v_0
     #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::FinalVelocity))]
     v_f: Option<f64>,
-    /// Velocity ceiling, in v_0 (optimal)
+    /// Velocity ceiling, in v_0 (optimal; for best_cubic that of the optimum)
     #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::VelocityCeiling))]
     v_ceiling: Option<f64>,
     /// Friction ceiling, in mu_0 sigma (optimal, bounded_friction)

@@ -72,7 +72,8 @@ pub fn summary(audit: &Audit) -> String {
     }
     // Every failing column, or else the columns with the greatest differences.
     let failing = audit.worst.iter().filter(|worst| worst.difference > MAX_DIFFERENCE_RTOLS).count();
-    for worst in audit.worst.iter().take(failing.max(MIN_SHOWN_COLUMNS)) {
+    let shown = audit.worst.iter().filter(|worst| worst.difference > 0.0);
+    for worst in shown.take(failing.max(MIN_SHOWN_COLUMNS)) {
         let cells: Vec<String> = worst
             .row
             .iter()

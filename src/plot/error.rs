@@ -31,8 +31,24 @@ pub enum PlotError {
     #[error("{found} traces are too many for one picture\n  expected: at most {most}")]
     TooManyTraces { found: usize, most: usize },
     /// There is nothing to draw.
-    #[error("nothing to draw: the requested columns hold no numbers")]
+    #[error(
+        "nothing to draw: no row has a number in these columns\n  help: `slipsweep summary` counts the rows by status"
+    )]
     Nothing,
+    /// Both axes of a map are the same.
+    #[error(
+        "--x and --y are both `{axis}`\n  expected: two axes, or a column in --y\n  help: leave out one of the two"
+    )]
+    SameAxes { axis: String },
+    /// The horizontal axis has one value.
+    #[error("--x {axis}: all rows have the same value\n  expected: one of {}\n  help: choose an axis that varies", .varying.join(", "))]
+    Constant { axis: String, varying: Vec<String> },
+    /// A column of words as lines.
+    #[error(
+        "--y {column}: words make no line\n  expected: a column of numbers\n  help: in a map over two axes, --color {column} shows them; \
+         `slipsweep query` lists them"
+    )]
+    Words { column: String },
     /// The dataset has no table of this name.
     #[error("the dataset has no table `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoTable { name: String, found: Vec<String> },
@@ -41,7 +57,7 @@ pub enum PlotError {
     NoColumn { argument: String, table: String, what: &'static str, name: String, found: Vec<String> },
     /// A condition that cannot be read.
     #[error(
-        "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them\n  help: such as --where \"a=0.03\""
+        "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them; several of them separated by commas\n  help: such as --where \"a=0.03, v_f>=10\"; `slipsweep query` supports `or` and `in`"
     )]
     Condition { text: String },
     /// No row meets the conditions.
@@ -55,10 +71,9 @@ pub enum PlotError {
     OneRow { table: String },
     /// A map needs two axes.
     #[error(
-        "--color {column}: a map needs two axes of several values, which the table `{table}` does not have\n  help: \
-             --y {column} draws lines"
+        "--color {column}: a map needs two axes of several values, which the table `{table}` does not have{}", if *.are_words { "\n  help: `slipsweep query` lists the words" } else { "\n  help: --y COLUMN draws lines" }
     )]
-    NoMap { table: String, column: String },
+    NoMap { table: String, column: String, are_words: bool },
     /// Traces in different units.
     #[error(
         "the traces differ in the unit of `{column}`\n  found: {} and {}\n  expected: the same units\n  help: draw them one by one, or \

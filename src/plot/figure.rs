@@ -39,6 +39,9 @@ const WORD_SPACE: f64 = 5.0;
 /// Height of leaders and labels above a panel, in points. Derived: leader, gap and letters.
 const WORDS_HEIGHT: f64 = LEADER_LENGTH + 2.5 + NOTE_SIZE;
 
+/// Least width of a panel with its margins, in points; panels of a narrower figure stand in fewer columns. Chosen: three labels fit below a panel.
+const MIN_PANEL_WIDTH: f64 = 100.0;
+
 /// Space between a map and its colour bar, and width of the bar, in points. Chosen: the bar is as wide as a letter is high.
 const BAR_SPACE: f64 = 6.0;
 const BAR_WIDTH: f64 = 8.0;
@@ -303,13 +306,20 @@ impl Figure {
     fn draw_legend(&self, canvas: &mut Canvas, top: f64, inner: f64) -> f64 {
         let (mut x, mut y) = (MARGIN, top + SIZE);
         for entry in &self.legend {
-            let wide = KEY_WIDTH + SIZE * label::width(&entry.text) + 10.0;
+            let most = (inner - KEY_WIDTH) / SIZE;
+            let lines: Vec<String> =
+                label::wrapped(&entry.text, most).iter().map(|line| label::shortened(line, most)).collect();
+            let widest = lines.iter().map(|line| label::width(line)).fold(0.0, f64::max);
+            let wide = KEY_WIDTH + SIZE * widest + 10.0;
             if x > MARGIN && x + wide - 8.0 > MARGIN + inner {
                 x = MARGIN;
                 y += SIZE + 3.0;
             }
             entry.key.draw(canvas, (x, y - 0.35 * SIZE));
-            canvas.text((x + KEY_WIDTH, y), &entry.text, &LABEL);
+            for (place, line) in lines.iter().enumerate() {
+                y += if place > 0 { SIZE + 1.5 } else { 0.0 };
+                canvas.text((x + KEY_WIDTH, y), line, &LABEL);
+            }
             x += wide;
         }
         y + 4.0
@@ -323,7 +333,8 @@ impl Figure {
 
     /// The layout of the panels in a width of `inner` points.
     fn layout(&self, inner: f64, as_powers: bool) -> Layout {
-        let columns = self.columns.clamp(1, self.panels.len().max(1));
+        let most = if self.rows.is_empty() { (inner / MIN_PANEL_WIDTH) as usize } else { usize::MAX };
+        let columns = self.columns.min(most).clamp(1, self.panels.len().max(1));
         // A first guess of a panel's width determines the number of ticks, and so the space for their labels.
         let guess = inner / columns as f64 - 40.0;
         let ticks = |(place, panel): (usize, &Panel)| PanelTicks {
@@ -344,7 +355,7 @@ impl Figure {
             let left = if ticks.y_label { TICK_LENGTH + 2.0 + widest(&ticks.y) + 3.0 + SIZE + 3.0 } else { 5.0 };
             lefts[column] = lefts[column].max(left.max(before + 3.0));
             rights[column] = rights[column].max(after + 2.0);
-            let below = if ticks.x_label { TICK_LENGTH + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 2.0 };
+            let below = if ticks.x_label { TICK_LENGTH + TICK_SIZE + 4.0 + SIZE + 6.0 } else { 0.5 * TICK_SIZE + 1.0 };
             belows[row] = belows[row].max(below);
         }
         let room: f64 = lefts.iter().sum::<f64>() + rights.iter().sum::<f64>();

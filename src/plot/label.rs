@@ -62,6 +62,16 @@ pub fn literal(text: &str) -> String {
     text.chars().map(|letter| if letter.is_control() || "*_^{}".contains(letter) { ' ' } else { letter }).collect()
 }
 
+/// A text in markup, shortened to a width of `most` (in units of the font size), with an ellipsis in place of the rest.
+pub fn shortened(markup: &str, most: f64) -> String {
+    if width(markup) <= most {
+        return markup.to_owned();
+    }
+    let mut text = literal(&plain(markup));
+    while text.pop().is_some() && width(&text) + 1.0 > most {}
+    text + "…"
+}
+
 /// The width of a text in markup, at a font size of 1.
 pub fn width(markup: &str) -> f64 {
     spans(markup).iter().map(span_width).sum()
@@ -216,19 +226,33 @@ pub fn number_among(value: f64, others: &[f64]) -> String {
     if !special.is_empty() {
         return special.to_owned();
     }
-    let scientific = format!("{:.4e}", value.abs());
-    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let digits = digits(others);
+    let scientific = format!("{:.*e}", digits - 1, value.abs());
+    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     let minus = if value < 0.0 { "−" } else { "" };
     if exponent == 0 || !as_powers && (-3..5).contains(&exponent) {
-        let decimals = usize::try_from(4 - exponent).unwrap_or(0);
+        let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
         return format!("{minus}{}", trimmed(&format!("{:.decimals$}", value.abs())));
     }
-    match trimmed(digits) {
+    match trimmed(mantissa) {
         "1" => format!("{minus}10^{{{}}}", signed(exponent)),
         digits => format!("{minus}{digits}×10^{{{}}}", signed(exponent)),
     }
 }
+
+/// Digits that distinguish ascending numbers: five, or more for close ones.
+fn digits(values: &[f64]) -> usize {
+    if values.len() > MAX_COMPARED_VALUES {
+        return 5;
+    }
+    let gap = |pair: &[f64]| (pair[1] - pair[0]).abs() / pair[1].abs().max(pair[0].abs());
+    let least = values.windows(2).map(gap).filter(|gap| *gap > 0.0).fold(1.0, f64::min);
+    (2.0 - least.log10().floor()).clamp(5.0, 17.0) as usize
+}
+
+/// Greatest number of values whose differences determine the number of digits. Chosen: a picture names fewer.
+const MAX_COMPARED_VALUES: usize = 1000;
 
 /// Removes trailing zeros of the decimals.
 fn trimmed(digits: &str) -> &str {
@@ -239,7 +263,11 @@ fn trimmed(digits: &str) -> &str {
 pub fn wrapped(markup: &str, most: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     // Spaces within equations are protected during line breaking.
-    let markup = markup.replace(" = ", "\u{a0}=\u{a0}");
+    let markup = markup.split_inclusive([',', ';']).map(|part| match part.contains(" = ") && width(part) <= most {
+        true => part.trim_start().replace(' ', "\u{a0}"),
+        false => part.trim_start().to_owned(),
+    });
+    let markup = markup.collect::<Vec<_>>().join(" ").replace(" = ", "\u{a0}=\u{a0}");
     for word in markup.split(' ') {
         let word = &word.replace('\u{a0}', " ");
         match lines.last_mut() {

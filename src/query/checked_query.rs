@@ -47,7 +47,7 @@ pub fn is_one_of(names: &str, function: &Function) -> bool {
 }
 
 /// The help for most queries.
-pub const GENERAL_HELP: &str =
+const GENERAL_HELP: &str =
     "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
 
 impl CheckedQuery {
@@ -65,15 +65,22 @@ impl CheckedQuery {
                 InvalidQuery::new(format!("not SQL: {text}"), GENERAL_HELP)
             }
         })?;
-        let [statement] = <[Statement; 1]>::try_from(statements)
-            .map_err(|_| InvalidQuery::new("several statements, or none", "write one SELECT"))?;
+        let [statement] = <[Statement; 1]>::try_from(statements).map_err(|statements| {
+            let found = if statements.is_empty() { "the query is empty" } else { "several statements" };
+            InvalidQuery::new(found, "write one SELECT")
+        })?;
         let Statement::Query(mut query) = statement else {
             let words = statement.to_string();
             let first = words.split_whitespace().next().unwrap_or_default().to_uppercase();
-            return Err(InvalidQuery::new(
-                format!("{first} is refused: `query` reads and never writes"),
-                "write one SELECT",
-            ));
+            return Err(match first.as_str() {
+                "SHOW" | "DESCRIBE" | "EXPLAIN" | "DESC" => InvalidQuery::new(
+                    format!("{first} is not supported"),
+                    "`slipsweep head DATASET` lists the tables with their columns; write one SELECT",
+                ),
+                _ => {
+                    InvalidQuery::new(format!("{first} is refused: `query` reads and never writes"), "write one SELECT")
+                }
+            });
         };
         let mut check = Check { sources, tables: HashSet::new(), fault: None };
         walk(query.as_mut(), &mut check);

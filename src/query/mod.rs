@@ -22,7 +22,7 @@ use crate::dataset::{DatasetError, guarded};
 use crate::names::{hint, nearest};
 
 pub use answer::{Answer, AnswerError, Format};
-use checked_query::{CheckedQuery, GENERAL_HELP, InvalidQuery};
+use checked_query::{CheckedQuery, InvalidQuery};
 pub use scan::is_unreadable;
 pub use source::Source;
 
@@ -51,6 +51,9 @@ pub enum QueryError {
     )]
     Read { path: String, source: PolarsError },
 }
+
+/// The help for an error of polars.
+const SHORT_HELP: &str = "correct the query";
 
 /// Greatest length of an error of polars in a message, in characters. Chosen: two lines.
 const MAX_ERROR_CHARS: usize = 200;
@@ -148,7 +151,13 @@ impl Tables {
             };
             return self.refuse(format!("no column `{name}`"), &help);
         }
-        self.refuse(line.to_owned(), GENERAL_HELP)
+        // Names of types and of nodes of the syntax tree of polars mean nothing to a user.
+        let is_internal = line.contains("Query {") || line.contains(" { ") && line.contains("expression");
+        if is_internal {
+            let found = "a part of the query is not supported, such as EXISTS or a subquery in an expression";
+            return self.refuse(found.to_owned(), "write it as a join, or with WITH");
+        }
+        self.refuse(line.to_owned(), SHORT_HELP)
     }
 
     fn refuse(&self, found: String, help: &str) -> QueryError {

@@ -1,6 +1,7 @@
 //! One axis of a spec: numbers, words, a range, an expression or a sample, checked against its legal values.
 
 use super::error::{SpecError, refuse, unknown};
+use super::read::help_for_word;
 use super::spec::{AXIS, AxisForm, AxisSpec, AxisValue};
 use super::units::{help, legal};
 use crate::grid::{Axis, Design, Quantity, Scale, Values};
@@ -48,7 +49,7 @@ pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Re
     let axis = AxisDraft { quantity, units, scale: Scale::Model, key };
     let values = match spec {
         AxisSpec::One(AxisValue::Word(word)) if words.is_empty() => {
-            return refuse(key, format!("found string {word:?}"), AXIS, "change the value");
+            return refuse(key, format!("found string {word:?}"), AXIS, help_for_word(word));
         }
         AxisSpec::One(one) => vec![axis.value(key, one)?],
         AxisSpec::List(values) if values.is_empty() => {
@@ -94,7 +95,7 @@ impl AxisDraft<'_> {
         let words = self.quantity.words();
         match value {
             AxisValue::Word(word) if words.is_empty() => {
-                refuse(key, format!("found string {word:?}"), "a number", "change the value")
+                refuse(key, format!("found string {word:?}"), "a number", help_for_word(word))
             }
             AxisValue::Word(word) => match words.iter().position(|known| known == word) {
                 Some(place) => Ok(place as f64),
@@ -168,6 +169,13 @@ impl AxisDraft<'_> {
             return refuse(key, format!("{} values", numbers.len()), names, "give exactly three values");
         };
         for (index, end) in [first, last].into_iter().enumerate() {
+            if key.ends_with("geomspace") && end <= 0.0 && self.legal(end).is_err() {
+                let (found, help) = (
+                    format!("{end:?} is out of range"),
+                    "geomspace takes the first and the last value, not their exponents",
+                );
+                return refuse(format!("{key}[{index}]"), found, "a positive number", help);
+            }
             let legal = if end.is_finite() { self.legal(end) } else { Err("finite ends".to_owned()) };
             if let Err(legal) = legal {
                 return self.out_of_range(&format!("{key}[{index}]"), end, legal);

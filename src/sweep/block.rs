@@ -41,7 +41,13 @@ pub fn check(spec: &BlockSpec, prefix: String, units: Option<&Units>, folder: &P
         let known = Quantity::ALL.map(Quantity::name);
         let Some(quantity) = Quantity::from_name(name) else {
             axes.extend(nearest(name, known).and_then(Quantity::from_name).map(|meant| (meant, None)));
-            faults.push(unknown(key, "axis", name, &known));
+            let mut fault = unknown(key, "axis", name, &known);
+            match name.as_str() {
+                "tables" => fault.help = "write a header for each table, such as [tables.gap]".into(),
+                "name" | "description" | "points" | "zip" | "where" => fault.help = "move it above [axes]".into(),
+                _ => {}
+            }
+            faults.push(fault);
             continue;
         };
         let is_sound = !faults.concern(&key);

@@ -278,7 +278,7 @@ pub fn check_name(name: &str) -> Result<(), SpecError> {
     if (1..=MAX_NAME_BYTES).contains(&name.len()) && name.chars().all(legal) && !name.starts_with('.') {
         return Ok(());
     }
-    let expected = format!("at most {MAX_NAME_BYTES} letters, digits, '-', '_' and '.', the first not '.'");
+    let expected = format!("at most {MAX_NAME_BYTES} letters from a to z, digits, '-', '_' and '.', the first not '.'");
     refuse("name", format!("`{name}` cannot name a folder"), expected, "choose another name")
 }
 

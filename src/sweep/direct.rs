@@ -10,6 +10,7 @@ use super::check::{self, Request, Sweep};
 use super::error::{Faults, SpecError, refuse, unknown};
 use super::friction;
 use super::laws;
+use super::read::help_for_word;
 use super::spec::{AccuracySpec, ModelSpec};
 use super::units::{doubt, help, legal, units};
 use crate::dataset::{Layout, batch};
@@ -48,7 +49,7 @@ pub fn word(quantity: Quantity, word: &str) -> Result<f64, SpecError> {
     match words.iter().position(|known| *known == word) {
         Some(place) => Ok(place as f64),
         None if words.is_empty() => {
-            refuse(quantity.name(), format!("found string {word:?}"), "a number", "change the value")
+            refuse(quantity.name(), format!("found string {word:?}"), "a number", help_for_word(word))
         }
         None => Err(unknown(quantity.name().to_owned(), quantity.name(), word, &words)),
     }

@@ -8,6 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{Faults, SpecError, unknown};
 use super::spec::{AxisValue, Spec};
+use crate::grid::Quantity;
 use crate::names::nearest;
 
 impl Spec {
@@ -51,13 +52,53 @@ fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
         SpecError::new("", format!("the key `{name}` is a duplicate"), "each key once", "remove one of the two")
     } else {
         let expected = "key = value, [table] or # comment";
-        let help = match message.starts_with("string values must be quoted") {
-            true => "write a number without a unit, since `units` in [model] determines the units; put words in quotes",
-            false => "correct the line",
-        };
-        SpecError::new("", format!("not TOML: {message}"), expected, help)
+        let line = span.as_ref().map_or(0, |span| line_of(text, span.start));
+        let line = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
+        SpecError::new("", format!("not TOML: {message}"), expected, help_for_line(line))
     };
     SpecError { line: span.map(|span| line_of(text, span.start)), ..fault }
+}
+
+/// The help for a line that is not TOML.
+fn help_for_line(line: &str) -> &'static str {
+    let value = line.split_once('=').map_or(line, |(_, value)| value).trim();
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let has_decimal_comma = value.match_indices(',').any(|(at, _)| {
+        is_digit(value[..at].chars().next_back()) && is_digit(value[at + 1..].chars().next()) && !value.contains('[')
+    });
+    if line.contains(['\u{201c}', '\u{201d}', '\u{2018}', '\u{2019}']) {
+        "write straight quotes, \""
+    } else if has_decimal_comma {
+        "write a decimal point, not a comma"
+    } else if value.contains("space(") {
+        "write a range as { linspace = [first, last, count] } or { geomspace = [first, last, count] }"
+    } else if value.is_empty() && line.contains('=') {
+        "write a value after `=`"
+    } else if value.parse::<f64>().is_ok() {
+        "correct the line, or the one before"
+    } else if is_digit(value.chars().next()) && !value.contains(['*', '/']) {
+        "write a number without a unit, since `units` in [model] determines the units"
+    } else if value.starts_with(['[', '{', '"', '\'']) && !value.contains("expr") || !line.contains('=') {
+        "correct the line"
+    } else {
+        "put words in \"quotes\"; write an expression as { expr = \"10 * v_i\" }"
+    }
+}
+
+/// The help for text in place of a number.
+pub fn help_for_word(word: &str) -> String {
+    let word = word.trim();
+    if word.parse::<f64>().is_ok() {
+        "remove the quotes".to_owned()
+    } else if word.contains(['*', '/', '+', '('])
+        || word.split_whitespace().any(|part| Quantity::from_name(part).is_some())
+    {
+        format!("write an expression as {{ expr = {word:?} }}")
+    } else if word.starts_with(|c: char| c.is_ascii_digit()) {
+        "write the number alone, without quotes; `units` in [model] determines its unit".to_owned()
+    } else {
+        "write a number".to_owned()
+    }
 }
 
 /// A value of a spec with its key and span.
@@ -87,10 +128,19 @@ impl Entry<'_> {
             DeValue::Float(number) => format!("floating point `{number}`"),
             DeValue::Boolean(is) => format!("boolean `{is}`"),
             DeValue::Datetime(_) => "a date".to_owned(),
-            DeValue::Array(_) => "sequence".to_owned(),
-            DeValue::Table(_) => "map".to_owned(),
+            DeValue::Array(_) => "a list".to_owned(),
+            DeValue::Table(_) => "a table".to_owned(),
         };
-        self.fault(SpecError::new(self.key, format!("found {found}"), expected, "change the value"), faults);
+        let help = match self.value {
+            DeValue::String(word) if expected == "a number" => help_for_word(word),
+            DeValue::String(_) if self.key.starts_with("zip[") => {
+                "write a list of lists, as in [[\"a\", \"b\"]]".to_owned()
+            }
+            DeValue::String(word) if expected == "a list" => format!("write [{word:?}]"),
+            _ if expected == "a table" && self.key.starts_with("tables.") => format!("write [{}]", self.key),
+            _ => "change the value".to_owned(),
+        };
+        self.fault(SpecError::new(self.key, format!("found {found}"), expected, help), faults);
         None
     }
 

@@ -470,7 +470,11 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
         return Err(Absence::Border);
     };
     let mut parameters = scaled(value.a_2, value.a_3);
-    parameters.push(Parameter::new("gap", value.gap, "1", "(W_s - W*)/W*"));
+    let doc = match bounds.v_ceiling.is_finite() {
+        true => "(W_s - W*)/W*; W* obeys v_ceiling, the shortcut need not",
+        false => "(W_s - W*)/W*",
+    };
+    parameters.push(Parameter::new("gap", value.gap, "1", doc));
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 

@@ -46,6 +46,17 @@ pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) 
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());
     let is_axis = |name: &&str| filtered.axis(name).is_some();
     // Two axes, or a column of colours, select a map; another column selects lines.
+    if let (Some(x), Some(y)) = (x, y)
+        && x == y
+    {
+        return Err(PlotError::SameAxes { axis: x.to_owned() });
+    }
+    if let Some(x) = x.filter(|x| filtered.axis(x).is_some_and(|axis| !axis.varies() && !axis.infinite))
+        && !choice.varying.is_empty()
+    {
+        let varying = choice.varying.iter().map(|axis| axis.name.clone()).collect();
+        return Err(PlotError::Constant { axis: x.to_owned(), varying });
+    }
     if let Some(y) = y.filter(is_axis) {
         let x = x.map(str::to_owned).or_else(|| choice.find(defaults.x, Some(y), 2)).or_else(|| choice.longest());
         let x = x.filter(|x| x != y).ok_or_else(|| choice.one_row())?;
@@ -60,7 +71,11 @@ pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) 
         return choice.map(x, y);
     }
     if let Some(column) = wants_map {
-        return Err(PlotError::NoMap { table: filtered.table.clone(), column: column.to_owned() });
+        let are_words = !filtered.words(column).is_empty();
+        return Err(PlotError::NoMap { table: filtered.table.clone(), column: column.to_owned(), are_words });
+    }
+    if let Some(y) = y.filter(|y| !filtered.words(y).is_empty()) {
+        return Err(PlotError::Words { column: y.to_owned() });
     }
     let preferred = || choice.find(defaults.x, colour, 3).or_else(|| choice.longest());
     let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 2));

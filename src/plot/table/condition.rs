@@ -49,12 +49,15 @@ impl Condition {
 
     fn one(text: &str) -> Result<Condition, PlotError> {
         let wrong = || PlotError::Condition { text: text.trim().to_owned() };
+        if text.contains(" or ") || text.to_lowercase().contains(" in ") {
+            return Err(wrong());
+        }
         // The first sign; of several at one position, the longest.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
         let (place, length, relation) =
             found.min_by_key(|(place, length, _)| (*place, 2 - *length)).ok_or_else(wrong)?;
         let (column, value) = (text[..place].trim(), text[place + length..].trim().trim_matches(['"', '\'']));
-        if column.is_empty() || value.is_empty() {
+        if column.is_empty() || value.is_empty() || value.starts_with(['<', '>', '=', '!']) {
             return Err(wrong());
         }
         Ok(Condition { column: column.to_owned(), relation, value: value.to_owned() })

@@ -4,6 +4,8 @@ use std::cmp::Ordering;
 use std::collections::{HashMap, HashSet};
 
 use super::filtered::{FilteredTable, Values, bits};
+use indexmap::IndexMap;
+
 use crate::grid::Quantity;
 use crate::plot::colour::MAX_SERIES;
 use crate::plot::{Figure, PlotError, label};
@@ -151,23 +153,29 @@ impl Groups {
     /// A part that cannot be read.
     pub fn of_panels(filtered: &FilteredTable, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(filtered, drawn)?;
-        Ok((Groups::new(filtered, &further, GroupRole::Panels)?, along))
+        Ok((Groups::new(filtered, &further, GroupRole::Panels, None)?, along))
     }
 
-    /// The groups of the rows of `filtered` over `axes`. If a figure cannot show all of them, an even selection; beyond `MAX_GROUPS`, one group of
-    /// all rows. Two independent axes make rows and columns of panels, also for pairs without rows.
+    /// The groups of the rows of `filtered` over `axes`. If a figure cannot show all of them, all values of `series`, or of the last axis, at one or
+    /// more values of the other axes; beyond `MAX_GROUPS`, one group of all rows. Two independent axes make rows and columns of panels, also for pairs without rows.
     ///
     /// # Errors
     ///
     /// A part that cannot be read.
-    pub fn new(filtered: &FilteredTable, axes: &[&str], makes: GroupRole) -> Result<Groups, PlotError> {
+    pub fn new(
+        filtered: &FilteredTable,
+        axes: &[&str],
+        makes: GroupRole,
+        series: Option<&str>,
+    ) -> Result<Groups, PlotError> {
         let found = keys(filtered, axes, makes)?;
         if found.len() > MAX_GROUPS {
             return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1, makes));
         }
         let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
         let varying = varying(&found);
-        let shown = choice(&found, most, makes).into_iter().map(|place| {
+        let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
+        let shown = choice(&found, most, makes, series).into_iter().map(|place| {
             let named =
                 varying.iter().map(|&axis| (axes[axis], found[place][axis])).filter(|(_, value)| !value.is_nan());
             let words = named.filter_map(|(name, value)| Some(filtered.axis(name)?.text_of(value)));
@@ -355,17 +363,30 @@ fn varying(found: &[Vec<f64>]) -> Vec<usize> {
     (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
 }
 
-/// The indices of the shown groups, at most `most`: first merged lines.
-fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole) -> Vec<usize> {
+/// The indices of the shown groups, at most `most`: first merged lines, then sets of groups that differ in one axis alone, `series` or the last one,
+/// and so are comparable.
+fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usize>) -> Vec<usize> {
     let is_kept = |place: &usize| makes == GroupRole::Lines && found[*place].iter().any(|value| value.is_nan());
     let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(is_kept);
     places.truncate(most);
-    let room = most - places.len();
-    if varying(found).len() > 2 {
-        // Neighbours in the order of the grid differ in one axis, and are comparable.
-        places.extend(others.into_iter().take(room));
-    } else {
-        places.extend(chosen(others.len(), room).into_iter().map(|place| others[place]));
+    let varying = varying(found);
+    let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
+    let rest = |place: usize| -> Vec<u64> {
+        let axes = (0..found[place].len()).filter(|axis| Some(*axis) != fast);
+        axes.map(|axis| found[place][axis].to_bits()).collect()
+    };
+    let mut sets: IndexMap<Vec<u64>, Vec<usize>> = IndexMap::new();
+    others.iter().for_each(|&place| sets.entry(rest(place)).or_default().push(place));
+    if sets.values().all(|set| set.len() == 1) {
+        // Axes that advance together.
+        sets = IndexMap::from([(Vec::new(), others)]);
+    }
+    for set in sets.into_values() {
+        let room = most - places.len();
+        if !places.is_empty() && set.len() > room {
+            break;
+        }
+        places.extend(chosen(set.len(), room).into_iter().map(|place| set[place]));
     }
     places.sort_unstable();
     places

@@ -103,11 +103,14 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
         notes.push("Zeros, and rounding errors in their place, are below the logarithmic axes.".to_owned());
     }
     notes.extend(rows.along.take().into_iter().chain(no_value));
-    if !rows.cells.exact {
+    if rows.has_ranges() {
         let (count, name) = (rows.cells.len(), label::name(&plan.x));
-        notes.push(format!(
-            "{count} values of {name} have several rows each: their least and greatest values are drawn."
-        ));
+        notes.push(match rows.cells.exact {
+            true => format!("Values of {name} have several rows each: the least and the greatest are drawn."),
+            false => {
+                format!("{count} values of {name} have several rows each: their least and greatest values are drawn.")
+            }
+        });
     }
     let leaves_out = |panel| is_gap_of_families(filtered, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
     if (0..plan.y.len()).any(leaves_out) {
@@ -139,7 +142,8 @@ impl Rows {
         let (mut further, along) = groups::further(filtered, &[&plan.x])?;
         let are_scattered = groups::is_scattered(filtered, &plan.x, &further)?;
         further.sort_by_key(|name| Some(*name) != plan.series.as_deref());
-        let groups = Groups::new(filtered, &further, GroupRole::Lines)?;
+        let first = further.first().copied().filter(|name| Some(*name) == plan.series.as_deref());
+        let groups = Groups::new(filtered, &further, GroupRole::Lines, first)?;
         let is_named = are_scattered && filtered.rows <= MAX_NAMED_ROWS;
         let labels = if is_named { filtered.label_columns() } else { Vec::new() };
         let cells = AxisCells::new(axis, MAX_POSITIONS);
@@ -191,16 +195,20 @@ impl Rows {
         })
     }
 
-    /// The points of a curve; at positions with several values, the least and the greatest.
+    /// The points of a curve; where positions have several values, the least ones and then, after a gap, the greatest.
     fn curve(&self, ranges: &[(f64, f64)]) -> Vec<(f64, f64)> {
-        let mut points = Vec::with_capacity(ranges.len());
-        for (&middle, &(low, high)) in self.cells.middles.iter().zip(ranges) {
-            points.push((middle, low));
-            if high > low {
-                points.push((middle, high));
-            }
+        let places = || self.cells.middles.iter().copied().zip(ranges);
+        let mut points: Vec<(f64, f64)> = places().map(|(middle, (low, _))| (middle, *low)).collect();
+        if ranges.iter().any(|(low, high)| high > low) {
+            points.push((f64::NAN, f64::NAN));
+            points.extend(places().map(|(middle, (_, high))| (middle, *high)));
         }
         points
+    }
+
+    /// Whether some position has several values.
+    fn has_ranges(&self) -> bool {
+        self.lines.iter().flat_map(|line| &line.ranges).flatten().any(|(low, high)| high > low)
     }
 
     /// For each line, the first line with which it coincides in all panels.
