@@ -9,7 +9,7 @@ use super::kind::{self, Kind as PathKind};
 use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
-use super::{EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, say, summary, words, wrong};
+use super::{EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, refused, say, summary, words, wrong};
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
 use crate::grid::Quantity;
@@ -52,6 +52,10 @@ pub struct Arguments {
 /// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
+    if let Some(out) = arguments.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
+        let found = format!("--out {}: not a folder", out.display());
+        return Err(refused(found, "a folder, which the run makes if it is missing", "name a folder"));
+    }
     let (sweep, folder) = subject(arguments)?;
     let planning = Wait { quiet: arguments.quiet, ..Wait::new("planning the sweep") };
     let (plan, parts) = waiting(&planning, || {

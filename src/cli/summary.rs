@@ -93,7 +93,10 @@ pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String
 /// The summary of a table of `rows` rows.
 pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     let counts = words::statuses(&statistics.status);
-    let mut blocks = vec![SummaryBlock::Line(0, format!("{name}: {} ({counts})", words::things(rows, "row")))];
+    let there = statistics.status.iter().sum::<u64>();
+    let of = if there < rows { format!("{} of ", words::count(there)) } else { String::new() };
+    let counts = if counts.is_empty() { String::new() } else { format!(" ({counts})") };
+    let mut blocks = vec![SummaryBlock::Line(0, format!("{name}: {of}{}{counts}", words::things(rows, "row")))];
     match &statistics.rows {
         Some(rows) => blocks.extend(listing(statistics, &rows.iter().collect::<Vec<_>>())),
         None => {
@@ -113,7 +116,8 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
                 Some(counts) => counted(label, counts),
                 None => SummaryBlock::Line(2, format!("{label}: more than {MAX_KEPT_ROWS} different labels")),
             }));
-            blocks.extend(statistics.words.iter().map(|(column, counts)| counted(column, counts)));
+            let words = statistics.words.iter().filter(|(_, counts)| counts.iter().next().is_some());
+            blocks.extend(words.map(|(column, counts)| counted(column, counts)));
         }
     }
     blocks.extend(predicted(name, statistics));
@@ -178,7 +182,8 @@ fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Summary
     let names = places.iter().map(|&place| statistics.columns[place].0.clone()).collect();
     let units = places.iter().map(|&place| statistics.columns[place].1.clone()).collect();
     let rows = rows.iter().map(|row| places.iter().map(|&place| shown(row.cell(place))).collect()).collect();
-    at.into_iter().chain([SummaryBlock::Table(4, names, units, rows)]).collect()
+    let table = (!places.is_empty()).then_some(SummaryBlock::Table(4, names, units, rows));
+    at.into_iter().chain(table).collect()
 }
 
 /// A cell as text.

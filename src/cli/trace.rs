@@ -564,6 +564,10 @@ impl Arguments {
             )));
         }
         let path = Path::new(&self.subject);
+        if trace::names().any(|(known, _)| known == self.subject) && !path.exists() && Path::new(name).is_dir() {
+            let help = format!("slipsweep trace {name} {} --row {}", self.subject, self.row.unwrap_or(0));
+            return Err(refused(format!("{name}: a dataset after its table"), "the dataset, then the table", help));
+        }
         let (folder, manifest) = dataset(path)?;
         let Some(listed) = manifest.tables.iter().find(|table| table.name == name) else {
             let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();

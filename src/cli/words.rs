@@ -61,6 +61,7 @@ pub fn bytes(bytes: f64) -> String {
 /// `seconds` in a fitting unit.
 pub fn duration(seconds: f64) -> String {
     match seconds {
+        s if s < 1e-5 => "less than 0.01 ms".to_owned(),
         s if s < 0.9995 => format!("{} ms", short(s * 1e3)),
         s if s < 120.0 => format!("{} s", short(s)),
         s if s < 7200.0 => format!("{} min", short(s / 60.0)),

@@ -24,7 +24,7 @@ fields! { Row:
     alpha_3 (Kind::Quantity(Quantity::Alpha3)) "coefficient of t^2 in theta; in the unit of alpha_3 in the spec, 1/t_f^2 by default"
         => |row| row.alpha_3;
     work "mu_0 sigma l" "work of friction W_s of the best shortcut" => |row| row.best.work;
-    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol" => |row| row.best.work_optimal;
+    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol, under v_ceiling if there is one" => |row| row.best.work_optimal;
     gap "1" "(W_s - W*)/W*, computed without cancellation; relative error up to 1e-7, or absolute error up to 1e-20; error up to 1e-11 (1 + gap) with a law other than ageing, or under a ceiling" => |row| row.best.gap;
     v_min "v_0" "least velocity of the best shortcut" => |row| row.best.v_min;
     work_error "mu_0 sigma l" "error bound of work, by a second search", optional => |row| row.work_error;

@@ -86,20 +86,42 @@ fn a_spec_that_is_no_file() {
     }
 }
 
+/// An axis that no table has, and scales in other units, are legal, but a warning names them.
+#[test]
+fn doubtful_axes_and_scales() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let spec = "name = \"k\"\n[axes]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nk = [1.0, 2.0]\ndt = [0.1, 0.2]\n[tables.crossover]\n";
+    fs::write(folder.path().join("k.toml"), format!("where = \"dt > 0\"\n{spec}")).expect("is writable");
+    let warning = "warning: k.toml:8: axes.k: no effect on crossover\n  expected: an axis of a requested table\n  help: remove it, or add a \
+                   table that has it: stability, step_response, compliant, regularised\n";
+    assert_eq!(String::from_utf8_lossy(&slipsweep(&["plan", "k.toml"], folder.path()).stderr), warning);
+    let used = spec.replace("dt = [0.1, 0.2]\n[tables.crossover]", "[tables.crossover]\n[tables.stability]");
+    fs::write(folder.path().join("used.toml"), used).expect("is writable");
+    assert!(slipsweep(&["plan", "used.toml"], folder.path()).stderr.is_empty());
+    let si = "name = \"si\"\n[model]\nunits = \"si\"\nmu_0 = 60\nl = 20\nv_0 = 1e-4\nnormal_stress = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
+              v_i = 3.0\nv_f = 10.0\n[tables.crossover]\n";
+    fs::write(folder.path().join("si.toml"), si).expect("is writable");
+    let output = slipsweep(&["plan", "si.toml"], folder.path());
+    let warnings = String::from_utf8_lossy(&output.stderr);
+    for expected in ["si.toml:5: model.l: 20 m is unusually large", "si.toml:4: model.mu_0: 60 is unusually large"] {
+        assert!(warnings.contains(expected), "{warnings}");
+    }
+}
+
 /// Values that are legal, and yet probably in other units, are computed with a warning.
 #[test]
 fn doubtful_velocities() {
     let folder = tempfile::tempdir().expect("is writable");
     let spec = "name = \"fast\"\n[model]\nunits = \"Si\"\nmu_0 = 0.6\nl = 1e-6\nv_0 = 1e-4\nnormal_stress = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
-                v_i = 3.0\nv_f = { geomspace = [10.0, 1e7, 3] }\n[tables.crossover]\n";
+                v_i = 3.0\nv_f = { geomspace = [10.0, 1e3, 3] }\n[tables.crossover]\n";
     fs::write(folder.path().join("fast.toml"), spec).expect("is writable");
     let output = slipsweep(&["plan", "fast.toml"], folder.path());
-    let warning = "warning: fast.toml:12: axes.v_f: 10000000.0 m/s is unphysically fast\n  expected: velocities in m/s, \
+    let warning = "warning: fast.toml:12: axes.v_f: 1000.0 m/s is unusually fast\n  expected: velocities in m/s, \
                    because of `units = \"si\"`\n  help: if these are in units of v_0, multiply them by v_0, or remove `units` and the scales \
                    from [model]\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), warning);
     assert_eq!(output.status.code(), Some(0));
-    fs::write(folder.path().join("fast.toml"), spec.replace("1e7", "1e6")).expect("is writable");
+    fs::write(folder.path().join("fast.toml"), spec.replace("1e3", "40.0")).expect("is writable");
     assert!(slipsweep(&["plan", "fast.toml"], folder.path()).stderr.is_empty());
 }
 
@@ -111,10 +133,9 @@ fn a_place_that_cannot_be_written() {
     fs::write(folder.path().join("good.toml"), GOOD).expect("is writable");
     fs::write(folder.path().join("file"), "").expect("is writable");
     let output = slipsweep(&["run", "good.toml", "--out", "file"], folder.path());
-    let message = "error: file/good/manifest.json: cannot read: Not a directory (os error 20)\n  help: solve this and run the same \
-                   command again, which keeps finished parts; or write elsewhere with --out DIR\n";
+    let message = "error: --out file: not a folder\n  expected: a folder, which the run makes if it is missing\n  help: name a folder\n";
     assert_eq!(String::from_utf8_lossy(&output.stderr), message);
-    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(output.status.code(), Some(1));
 }
 
 #[test]

@@ -58,6 +58,22 @@ fn descending_axes_have_the_rows_of_ascending_ones() {
     }
 }
 
+/// A velocity ceiling bounds the optimum of every table that has one, whether the spec names a law or not.
+#[test]
+fn regress_a_ceiling_without_a_law_bounds_the_optimum_of_every_table() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "t_f = [0.02, 0.1]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nv_ceiling = [600.0, inf]\n";
+    let plane = "alpha_2 = { linspace = [-0.12, 0.0, 2], unit = \"1/t_f\" }\nalpha_3 = { linspace = [-0.06, 0.0, 2], unit = \"1/t_f^2\" }\n";
+    let optimal = numbers(&table(folder.path(), axes, "optimal").0, "work");
+    assert!(optimal[0] > optimal[1] && optimal[2] > optimal[3], "{optimal:?}");
+    assert_eq!(numbers(&table(folder.path(), axes, "best_cubic").0, "work_optimal"), optimal);
+    let all = numbers(&table(folder.path(), &format!("{axes}{plane}"), "gap").0, "work_optimal");
+    assert_eq!(all.len(), 4 * optimal.len());
+    for (four, optimal) in all.chunks(4).zip(optimal) {
+        assert!(four.iter().all(|work| *work == optimal), "{four:?} {optimal}");
+    }
+}
+
 #[test]
 fn regress_values_that_repeat_make_repeated_rows() {
     let folder = tempfile::tempdir().expect("is writable");

@@ -56,6 +56,15 @@ fn the_page_holds_everything_and_opens_without_an_error() {
     // Two maps show their values; nothing is loaded from a network.
     assert_eq!(page.matches("\"column\":\"gap\"").count(), 2);
     assert!(!page.contains("src=") && !page.contains("<link") && !page.contains("@import") && !page.contains("fetch("));
+    for out in ["page.pdf", "results/small/manifest.json", "results/small/gap/part-000000.parquet"] {
+        let refused = Command::new(env!("CARGO_BIN_EXE_slipsweep"))
+            .current_dir(folder)
+            .args(["report", "results/small", "--out", out])
+            .output()
+            .expect("runs");
+        assert_eq!(refused.status.code(), Some(1), "{out}");
+    }
+    command(folder, &["status", "results/small", "--check"]);
     command(folder, &["report", "results/small", "--out", "again.html"]);
     // The plan estimates from a sample that takes its time; the rest is the same again.
     let again = fs::read_to_string(folder.join("again.html")).expect("is readable");

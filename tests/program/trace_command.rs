@@ -230,7 +230,7 @@ fn a_reader_that_has_had_enough_is_no_failure() {
 fn a_full_disk_is_a_failure_and_devices_stay_what_they_are() {
     use std::os::unix::fs::FileTypeExt;
 
-    let full = "error: cannot write /dev/full: No space left on device (os error 28)";
+    let full = "error: /dev/full: cannot write: No space left on device (os error 28)";
     for format in ["table", "csv", "parquet"] {
         let to_file = complaint(&[&["optimal"], UP, &["--format", format, "--out", "/dev/full"]]);
         assert_eq!(to_file, (Some(2), full.to_owned()));
@@ -258,7 +258,7 @@ fn a_file_is_replaced_whole_or_left_as_it_was() {
     assert_eq!(done.status.code(), Some(0));
     assert_eq!(fs::read_to_string(&path).expect("is there"), shown(&[&["optimal"], UP, &["--format", "csv"]]));
     let nowhere = complaint(&[&["optimal"], UP, &["--out", "no/such/folder/trace.csv"]]);
-    let expected = "error: cannot write no/such/folder/trace.csv: No such file or directory (os error 2)";
+    let expected = "error: no/such/folder/trace.csv: cannot write: No such file or directory (os error 2)";
     assert_eq!(nowhere, (Some(2), expected.to_owned()));
 }
 

@@ -131,7 +131,7 @@ pub struct Groups {
     makes: GroupRole,
     /// The titles of the rows and columns of panels, in markup, if two axes are crossed; the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
-    /// The fixed values of further axes, in markup, if two axes are crossed.
+    /// The values of further axes that all shown groups share, in markup.
     pub held: Vec<String>,
     places: HashMap<Vec<u64>, usize>,
 }
@@ -173,16 +173,19 @@ impl Groups {
             return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1, makes));
         }
         let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
-        let varying = varying(&found);
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
-        let shown = choice(&found, most, makes, series).into_iter().map(|place| {
-            let named =
-                varying.iter().map(|&axis| (axes[axis], found[place][axis])).filter(|(_, value)| !value.is_nan());
-            let words = named.filter_map(|(name, value)| Some(filtered.axis(name)?.text_of(value)));
-            Group { name: words.collect::<Vec<_>>().join(", "), values: found[place].clone() }
-        });
+        let shown: Vec<Vec<f64>> =
+            choice(&found, most, makes, series).into_iter().map(|place| found[place].clone()).collect();
+        let in_words = |of: &[usize], values: &[f64]| {
+            let named = of.iter().map(|&axis| (axes[axis], values[axis])).filter(|(_, value)| !value.is_nan());
+            named.filter_map(|(name, value)| Some(filtered.axis(name)?.text_of(value))).collect::<Vec<_>>()
+        };
+        let (named, different) = (varying(&shown), varying(&found));
+        let same: Vec<usize> = different.into_iter().filter(|axis| !named.contains(axis)).collect();
+        let held = shown.first().map_or_else(Vec::new, |first| in_words(&same, first));
+        let groups = shown.into_iter().map(|values| Group { name: in_words(&named, &values).join(", "), values });
         let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
-        let mut groups = Groups::of(axes, shown.collect(), found.len(), makes);
+        let mut groups = Groups { held, ..Groups::of(axes, groups.collect(), found.len(), makes) };
         if makes == GroupRole::Panels {
             groups.cross(filtered, &found);
         }

@@ -119,7 +119,14 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     let figure = Figure {
         columns: 1,
         aspect: ASPECTS[usize::from(plan.y.len() > 1)],
-        subtitle: stated.iter().filter_map(Graph::equation).collect::<Vec<_>>().join(", "),
+        subtitle: rows
+            .groups
+            .held
+            .iter()
+            .cloned()
+            .chain(stated.iter().filter_map(Graph::equation))
+            .collect::<Vec<_>>()
+            .join(", "),
         legend: rows.legend(&drawn, &leaders),
         remarks: rows.groups.note().into_iter().collect(),
         notes,
