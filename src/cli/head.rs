@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 #[cfg(feature = "query")]
 use super::query::unreadable;
-use super::{Failure, kind, no_table, say, summary, words};
+use super::{Failure, kind, no_table, say, summary, whole, words};
 #[cfg(feature = "query")]
 use crate::query::{Source, Tables};
 use crate::table;
@@ -20,7 +20,7 @@ pub struct Arguments {
     /// Table; all by default
     table: Option<String>,
     /// Number of rows
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 10)]
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 10, value_parser = whole::<u32>(0, u32::MAX.into()))]
     rows: u32,
 }
 

@@ -65,7 +65,10 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     };
     let name = bare.file_name().unwrap_or_default().to_string_lossy();
     let folder = bare.parent().unwrap_or(Path::new(""));
-    check_name(&name).map_err(|error| refused(error.found, error.expected, error.help))?;
+    check_name(&name).map_err(|error| {
+        let place = if name == given.to_string() { String::new() } else { format!("`{given}`: ") };
+        refused(format!("{place}{}", error.found), error.expected, error.help)
+    })?;
     if !(folder.as_os_str().is_empty() || folder.is_dir()) {
         let found = format!("`{given}`: there is no folder `{}`", folder.display());
         let expected = format!("a name such as {name}, or one in an existing folder");

@@ -307,6 +307,17 @@ fn load(path: &Path) -> Result<Sweep, Failure> {
     Ok(sweep)
 }
 
+/// A parser of whole numbers from `least` to `most`.
+fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| (least..=most).contains(number));
+        number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| match most {
+            u64::MAX => format!("expected a whole number from {least} upwards"),
+            _ => format!("expected a whole number from {least} to {most}"),
+        })
+    }
+}
+
 /// The failure for a wrong request.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: EXIT_REQUEST, message: format!("error: {message}") }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::{Failure, load, say, to_file, words, wrong};
+use super::{Failure, load, say, to_file, whole, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -20,13 +20,13 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     engine: Engine,
     /// Greatest number of shards; fewer if a task would have too little work
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=Shard::MAX_COUNT))]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(1, Shard::MAX_COUNT))]
     shards: u64,
     /// Parent folder of the dataset, on a file system common to all machines
     #[arg(short, long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
     /// Processors of a task
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1024))]
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = whole::<u64>(1, 1024))]
     cpus: u64,
     /// Least predicted work of a task, in minutes
     #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = minutes)]

@@ -8,7 +8,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, Type
 
 use super::kind::{self, Kind};
 use super::output::{self, Output};
-use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, words, write_file, wrong};
+use super::{
+    EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, whole, words, write_file, wrong,
+};
 use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Friction, StateLaw, Units};
@@ -46,7 +48,7 @@ pub struct Arguments {
     /// Table of the dataset
     table: Option<String>,
     /// Row of the table, counted from 0
-    #[arg(long, value_name = "N", requires = "table", conflicts_with = "conditions")]
+    #[arg(long, value_name = "N", requires = "table", conflicts_with = "conditions", value_parser = whole::<u64>(0, u64::MAX))]
     row: Option<u64>,
     /// Conditions that one row of the table meets, such as "t_f=0.02, v_f=100"
     #[arg(long = "where", value_name = "CONDITION", requires = "table")]
@@ -115,7 +117,7 @@ pub struct Arguments {
     #[arg(long, value_name = "R", value_parser = |text: &str| legal(text, RTOL))]
     rtol: Option<f64>,
     /// Number of equally spaced times [default: the fewest that show every detail]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(2, 10_000_000))]
     points: Option<u32>,
     #[command(flatten)]
     output: Output<Format>,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::watch::{Wait, waiting};
-use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, words};
+use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, whole, words};
 use crate::dataset::Cell;
 use crate::verify::{Audit, MAX_DIFFERENCE_RTOLS, verify as audit};
 
@@ -15,10 +15,10 @@ pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
     /// Number of rows to check in each table
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u64>(1, u64::MAX))]
     sample: u64,
     /// Seed of the sample
-    #[arg(long, value_name = "S", default_value_t = 0)]
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole::<u64>(0, u64::MAX))]
     seed: u64,
 }
 

@@ -52,9 +52,6 @@ pub enum QueryError {
     Read { path: String, source: PolarsError },
 }
 
-/// The help for an error of polars.
-const SHORT_HELP: &str = "correct the query";
-
 /// Greatest length of an error of polars in a message, in characters. Chosen: two lines.
 const MAX_ERROR_CHARS: usize = 200;
 
@@ -147,6 +144,7 @@ impl Tables {
                 None if sql.contains(&format!("\"{name}\"")) => {
                     format!("text goes in single quotes: '{name}'; double quotes are for names of columns")
                 }
+                None => format!("choose one of these; text goes in single quotes: '{name}'"),
                 _ => hint(name, columns()),
             };
             return self.refuse(format!("no column `{name}`"), &help);
@@ -157,7 +155,20 @@ impl Tables {
             let found = "a part of the query is not supported, such as EXISTS or a subquery in an expression";
             return self.refuse(found.to_owned(), "write it as a join, or with WITH");
         }
-        self.refuse(line.to_owned(), SHORT_HELP)
+        let known = |sign: &str| line.contains(sign);
+        let (found, help) = if known("GROUP BY clause") {
+            let name = line.split('\'').nth(1).unwrap_or_default();
+            let found = format!("`{name}` is neither in GROUP BY nor in an aggregate");
+            (found, format!("add it to GROUP BY, or write min({name}) or max({name})"))
+        } else if known("LIMIT/OFFSET") {
+            ("LIMIT and OFFSET take whole numbers from 0".to_owned(), "correct the number".to_owned())
+        } else if known("dtype") || known("cannot compare") || known("cannot cast") {
+            let help = "words can be compared and counted; arithmetic, sum and avg need numbers";
+            ("words in place of numbers, or numbers in place of words".to_owned(), help.to_owned())
+        } else {
+            (line.to_owned(), "correct the query".to_owned())
+        };
+        self.refuse(found, &help)
     }
 
     fn refuse(&self, found: String, help: &str) -> QueryError {

@@ -24,7 +24,11 @@ const GAP_ERROR: usize = 5;
 
 pub(super) const COLUMNS: &[Column] = &[
     Column::number("work", "mu_0 sigma l", "work of friction W_s of the shortcut"),
-    Column::number("work_optimal", "mu_0 sigma l", "least work of friction W* of any protocol, under v_ceiling if there is one"),
+    Column::number(
+        "work_optimal",
+        "mu_0 sigma l",
+        "least work of friction W* of any protocol, under v_ceiling if there is one",
+    ),
     Column::number("gap", "1", "(W_s - W*)/W*; error up to rtol (1 + gap)"),
     Column::number("v_min", "v_0", "least velocity of the shortcut"),
     Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second quadrature").optional(),

@@ -151,7 +151,7 @@ fn foreign_parts_are_left_alone() {
     fs::copy(Folder::new(&folder.path().join("other"), "test").part("optimal", 0), &path).expect("is writable");
     let foreign = fs::read(&path).expect("is there");
 
-    let output = slipsweep(folder.path()).args(["run", "spec.toml", "--out", "."]).output().expect("runs");
+    let output = slipsweep(folder.path()).args(["run", "spec.toml", "--out", ".", "--quiet"]).output().expect("runs");
     let message = format!(
         "error: ./test/optimal/part-000000.parquet: belongs to another spec\n  expected: {}\n  found: {}\n  help: move the file away; \
          `slipsweep run` then computes the part and keeps all others\n",

@@ -190,7 +190,10 @@ fn wrong_arguments_get_one_clear_message() {
             &[&["optimal", "--rtol", "1"], UP],
             "error: invalid value '1' for '--rtol <R>': expected 1e-13 <= rtol <= 1e-2",
         ),
-        (&[&["optimal", "--points", "1"], UP], "error: invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
+        (
+            &[&["optimal", "--points", "1"], UP],
+            "error: invalid value '1' for '--points <N>': expected a whole number from 2 to 10000000",
+        ),
         (&[&["optimum"], UP], "error: invalid value 'optimum' for '<PROTOCOL|DATASET>'"),
         (&[&["optimal", "--out", "x.dat"], UP], "error: --out x.dat: the ending is none of .csv, .parquet, .txt"),
     ];

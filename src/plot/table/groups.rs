@@ -372,6 +372,11 @@ fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usiz
     let is_kept = |place: &usize| makes == GroupRole::Lines && found[*place].iter().any(|value| value.is_nan());
     let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(is_kept);
     places.truncate(most);
+    if !places.is_empty() {
+        places.extend(chosen(others.len(), most - places.len()).into_iter().map(|place| others[place]));
+        places.sort_unstable();
+        return places;
+    }
     let varying = varying(found);
     let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
     let rest = |place: usize| -> Vec<u64> {
