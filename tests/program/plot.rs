@@ -167,8 +167,8 @@ fn refusals(folder: &Path) {
     );
     assert_eq!(
         with(&["--out", "gap.jpg"]),
-        "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n  help: for a folder, make it first or give a name \
-         without a dot\n"
+        "error: --out gap.jpg: the name ends in none of .svg, .png, .pdf\n  help: end it in one of these; for a folder, make it \
+         first\n"
     );
     let contradiction = with(&["--out", "gap.pdf", "--format", "png"]);
     assert!(contradiction.starts_with("error: --out gap.pdf: the ending contradicts --format\n"), "{contradiction}");
