@@ -44,8 +44,8 @@ fields! { Row:
     stiffness_ratio "1" "k t_f^2/m: the spring is nearly rigid if this is large; inf for m = 0"
         => |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY };
     open_loop_error "1"
-        "distance from the final steady state in that norm for continuous v_c: the amplified errors of rounding and of the \
-         simulation to rtol; null if the simulation does not reach t_f", optional
+        "distance of the simulated end from the final steady state in that norm, with continuous v_c: rounding and integration errors, amplified; \
+         null if the simulation does not reach t_f", optional
         => |row| number(row.open_loop_error);
     work_error "mu_0 sigma l" "error bound of work, by a second solve", optional => |row| row.work_error;
     gap_error "1" "error bound of gap, by a second solve of both works", optional => |row| row.least.gap_error;

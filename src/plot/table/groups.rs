@@ -157,7 +157,8 @@ impl Groups {
     }
 
     /// The groups of the rows of `filtered` over `axes`. If a figure cannot show all of them, all values of `series`, or of the last axis, at one or
-    /// more values of the other axes; beyond `MAX_GROUPS`, one group of all rows. Two independent axes make rows and columns of panels, also for pairs without rows.
+    /// more values of the other axes; beyond `MAX_GROUPS`, one group of all rows. Two independent axes make rows and columns of panels, also for
+    /// pairs without rows.
     ///
     /// # Errors
     ///
