@@ -131,7 +131,7 @@ pub struct Groups {
     makes: GroupRole,
     /// The titles of the rows and columns of panels, in markup, if two axes are crossed; the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
-    /// The values of further axes that all shown groups share, in markup.
+    /// The values of further axes that are common to all shown groups, in markup.
     pub held: Vec<String>,
     places: HashMap<Vec<u64>, usize>,
 }
