@@ -5,6 +5,7 @@ use std::path::PathBuf;
 #[cfg(feature = "query")]
 use super::query::unreadable;
 use super::{Failure, kind, no_table, say, summary, whole, words};
+use crate::protocol::Status;
 #[cfg(feature = "query")]
 use crate::query::{Source, Tables};
 use crate::table;
@@ -43,7 +44,7 @@ struct Head {
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
-    let texts: Vec<String> = heads(arguments)?.iter().map(Head::text).collect();
+    let texts: Vec<String> = heads(arguments)?.iter().map(|head| head.text(arguments)).collect();
     say(&texts.join("\n"))
 }
 
@@ -112,8 +113,17 @@ fn under(names: Vec<String>, units: Vec<String>, rows: Vec<Vec<String>>) -> Vec<
 }
 
 impl Head {
+    /// Whether the rows are all without a protocol, and others follow.
+    fn are_empty(&self) -> bool {
+        let Some((names, lines)) = self.lines.split_first() else { return false };
+        let Some(status) = names.iter().position(|name| name == table::STATUS) else { return false };
+        let mut words = lines.iter().filter_map(|line| line.get(status)).filter(|word| !word.is_empty());
+        let shown = words.clone().count() as u64;
+        shown > 0 && self.rows.is_some_and(|rows| rows > shown) && words.all(|word| word == Status::Infeasible.name())
+    }
+
     /// A line on the table, then names, units and rows.
-    fn text(&self) -> String {
+    fn text(&self, arguments: &Arguments) -> String {
         let mut text = self.name.clone();
         if let Some(rows) = self.rows {
             let meaning = table::find(&self.name).map(|table| format!("{}; ", table.doc())).unwrap_or_default();
@@ -124,6 +134,13 @@ impl Head {
         }
         text.push('\n');
         text.push_str(&words::aligned(&self.lines, 2));
+        if self.are_empty() {
+            let (path, name) = (arguments.dataset.display(), &self.name);
+            text.push_str(&format!(
+                "  the first rows with numbers: slipsweep query {path} \"SELECT * FROM {name} WHERE status = 'ok' LIMIT {}\"\n",
+                arguments.rows
+            ));
+        }
         text
     }
 }

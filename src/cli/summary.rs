@@ -106,6 +106,10 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
                 let arriving = if name == "shortcut" { " that reach the final state" } else { "" };
                 blocks.push(SummaryBlock::Line(2, format!("least gap of the rows with status ok{arriving}:")));
                 blocks.extend(listing(statistics, &least));
+                if least.iter().any(|row| is_above_ceiling(statistics, row)) {
+                    let line = "a negative gap: the shortcut is faster than v_ceiling, which bounds the optimum alone";
+                    blocks.push(SummaryBlock::Line(4, line.to_owned()));
+                }
             }
             blocks.extend(ranges(statistics));
             let counted = |column: &str, counts: &Counts| {
@@ -123,6 +127,21 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
     blocks.extend(predicted(name, statistics));
     blocks
 }
+
+/// Whether a shortcut costs less than the optimum under a velocity ceiling, which only a faster one can.
+fn is_above_ceiling(statistics: &TableStatistics, row: &StatisticsRow) -> bool {
+    let number = |name: &str| {
+        let place = statistics.columns.iter().position(|(column, _)| column == name)?;
+        match row.cell(place) {
+            Cell::Number(value) => Some(*value),
+            _ => None,
+        }
+    };
+    number("v_ceiling").is_some_and(f64::is_finite) && number("gap").is_some_and(|gap| gap < -MAX_ROUNDING)
+}
+
+/// Negative gap that is rounding, at most. Chosen: above the loosest useful `rtol` there are no such gaps.
+const MAX_ROUNDING: f64 = 1e-6;
 
 /// The columns of numbers.
 fn ranges(statistics: &TableStatistics) -> Option<SummaryBlock> {

@@ -11,7 +11,7 @@ use super::output::{self, Output};
 use super::{
     EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, whole, words, write_file, wrong,
 };
-use crate::dataset::{Cell, Folder, ManifestTable, Row, frame};
+use crate::dataset::{Cell, Folder, Manifest, ManifestTable, Row, frame};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Friction, StateLaw, Units};
 use crate::names::hint;
@@ -541,7 +541,13 @@ impl Arguments {
     }
 
     /// The number of the row of a table.
-    fn row_number(&self, path: &Path, folder: &Folder, table: &ManifestTable) -> Result<u64, Failure> {
+    fn row_number(
+        &self,
+        path: &Path,
+        folder: &Folder,
+        manifest: &Manifest,
+        table: &ManifestTable,
+    ) -> Result<u64, Failure> {
         match self.row {
             Some(row) => Ok(row),
             None if self.conditions.is_empty() => {
@@ -549,7 +555,7 @@ impl Arguments {
                 let expected = format!("--row N, from 0 to {last}, or --where CONDITION");
                 Err(refused(format!("{}: which row of `{}`?", path.display(), table.name), expected, "add --row 0"))
             }
-            None => the_row(path, folder, table, &self.conditions),
+            None => the_row(path, folder, (manifest, table), &self.conditions),
         }
     }
 
@@ -578,15 +584,15 @@ impl Arguments {
         if !trace::TABLES.contains(&name) {
             return Err(wrong(Pathless::Table(name.to_owned())));
         }
-        let number = self.row_number(path, &folder, listed)?;
-        let (part, written) = row_at(path, &folder, listed, number)?;
+        let number = self.row_number(path, &folder, &manifest, listed)?;
+        let (part, written) = row_at(path, &folder, &manifest, listed, number)?;
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
         let friction = friction(&spec.model)?;
         let headings = frame::headings(&part).map_err(Failure::failed)?.0;
         let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
             let heading = headings.iter().find(|heading| heading.name == alpha.name());
-            heading.is_some_and(|heading| heading.unit == alpha.unit(Scale::Duration))
+            heading.is_some_and(|heading| heading.unit == units.name(alpha.unit(Scale::Duration)))
         });
         let definition = table::find(name);
         let mut scaled = [(number, written.clone())];
@@ -633,17 +639,23 @@ fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
 }
 
 /// Reads a row of a table from its part.
-fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Result<(std::path::PathBuf, Row), Failure> {
+fn row_at(
+    path: &Path,
+    folder: &Folder,
+    manifest: &Manifest,
+    table: &ManifestTable,
+    row: u64,
+) -> Result<(std::path::PathBuf, Row), Failure> {
     if row >= table.rows {
         let (path, last) = (path.display(), table.rows.saturating_sub(1));
         return Err(wrong(format!("{path}: no row {row} in `{}`\n  expected: a row from 0 to {last}", table.name)));
     }
     let part = row / table.rows_per_part.max(1);
-    let file = folder.part(&table.name, part);
-    if !file.is_file() {
-        let (file, help) = (file.display(), "run the sweep again; it computes only missing parts");
-        return Err(wrong(format!("{file}: row {row} is in a part that is missing\n  help: {help}")));
-    }
+    let verified = folder.verified_part(manifest, table, part).map_err(Failure::failed)?;
+    let file = verified.ok_or_else(|| {
+        let (file, help) = (folder.part(&table.name, part), "run the sweep again; it computes only missing parts");
+        wrong(format!("{}: row {row} is in a part that is missing\n  help: {help}", file.display()))
+    })?;
     let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
     let row = frame::row(&file, place).map_err(Failure::failed)?;
     Ok((file, row))
@@ -653,13 +665,20 @@ fn row_at(path: &Path, folder: &Folder, table: &ManifestTable, row: u64) -> Resu
 const MAX_NAMED_ROWS: usize = 5;
 
 /// The only row of a table that meets all conditions. Reads only the columns of the conditions.
-fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[String]) -> Result<u64, Failure> {
+fn the_row(
+    path: &Path,
+    folder: &Folder,
+    (manifest, table): (&Manifest, &ManifestTable),
+    conditions: &[String],
+) -> Result<u64, Failure> {
     let mut all = Vec::new();
     for text in conditions {
         all.extend(Condition::all(text)?);
     }
     let names: Vec<&str> = all.iter().map(|condition| condition.column.as_str()).collect();
     let mut found = Vec::new();
+    // The value of the table that is nearest to each wanted number.
+    let mut nearest = vec![f64::NAN; all.len()];
     for part in folder.parts_there(table) {
         let file = folder.part(&table.name, part);
         if part == 0 || found.is_empty() {
@@ -679,24 +698,50 @@ fn the_row(path: &Path, folder: &Folder, table: &ManifestTable, conditions: &[St
                 Cell::Missing => false,
             })
         };
+        if found.is_empty() {
+            for (place, condition) in all.iter().enumerate() {
+                let Some(wanted) = condition.wanted() else { continue };
+                for row in 0..frame.height {
+                    if let Some((_, Cell::Number(value))) = frame.row(row).get(place)
+                        && !((value - wanted).abs() >= (nearest[place] - wanted).abs())
+                    {
+                        nearest[place] = *value;
+                    }
+                }
+            }
+        }
         found.extend((0..frame.height).filter(meets).take(MAX_NAMED_ROWS + 1).map(|place| first + place as u64));
         if found.len() > MAX_NAMED_ROWS {
             break;
         }
     }
-    let (path, name, conditions) = (path.display(), &table.name, conditions.join(", "));
+    let (at, name, conditions) = (path.display(), &table.name, conditions.join(", "));
     match found.as_slice() {
         [row] => Ok(*row),
         [] => {
-            let found = format!("{path}: no row of `{name}` meets --where {conditions:?}");
-            Err(wrong(format!("{found}\n  help: slipsweep head {path} {name}")))
+            let missed = all.iter().zip(&nearest).filter(|(condition, nearest)| !condition.holds(**nearest));
+            let missed: Vec<String> = missed
+                .filter(|(_, nearest)| nearest.is_finite())
+                .map(|(condition, nearest)| format!("{} = {nearest:?}", condition.column))
+                .collect();
+            let nearest =
+                if missed.is_empty() { String::new() } else { format!("\n  found: nearest {}", missed.join(", ")) };
+            let found = format!("{at}: no row of `{name}` meets --where {conditions:?}{nearest}");
+            Err(wrong(format!("{found}\n  help: slipsweep head {at} {name}")))
         }
         several => {
             let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
             let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
-            let what = format!("{path}: several rows of `{name}` meet --where {conditions:?}");
+            let what = format!("{at}: several rows of `{name}` meet --where {conditions:?}");
             let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
-            Err(refused(found, "one row", format!("--row {}", several[0])))
+            let rows = several.iter().map(|row| Ok(row_at(path, folder, manifest, table, *row)?.1));
+            let rows: Vec<Row> = rows.collect::<Result<_, Failure>>()?;
+            let varies = |place: usize| rows.iter().any(|row| row.get(place) != rows[0].get(place));
+            let names =
+                rows[0].iter().enumerate().filter(|(place, _)| varies(*place)).map(|(_, (name, _))| name.as_str());
+            let axes: Vec<&str> = names.filter(|name| Quantity::from_name(name).is_some()).collect();
+            let more = if axes.is_empty() { String::new() } else { format!(", or a condition on {}", axes.join(", ")) };
+            Err(refused(found, "one row", format!("--row {}{more}", several[0])))
         }
     }
 }

@@ -224,19 +224,31 @@ impl Folder {
     ///
     /// If a part is damaged, or does not belong to the dataset.
     pub fn verified(&self, manifest: &Manifest, table: &ManifestTable) -> Result<(Vec<PathBuf>, u64), DatasetError> {
-        let there = self.parts_there(table);
-        let open = |part: u64| {
-            let path = self.part(&table.name, part);
-            match self.state(manifest, &table.name, part, CheckDepth::Footer) {
-                State::There { .. } => Ok(Some(path)),
-                State::Missing => Ok(None),
-                fault => Err(self.fault(&path, fault)),
-            }
-        };
-        let opened: Result<Vec<Option<PathBuf>>, DatasetError> = there.into_par_iter().map(open).collect();
+        let there = self.parts_there(table).into_par_iter();
+        let opened: Result<Vec<Option<PathBuf>>, DatasetError> =
+            there.map(|part| self.verified_part(manifest, table, part)).collect();
         let paths: Vec<PathBuf> = opened?.into_iter().flatten().collect();
         let missing = table.parts - paths.len() as u64;
         Ok((paths, missing))
+    }
+
+    /// The path of a part whose footer is verified; `None` if it is missing.
+    ///
+    /// # Errors
+    ///
+    /// If the part is damaged, or does not belong to this place of the dataset.
+    pub fn verified_part(
+        &self,
+        manifest: &Manifest,
+        table: &ManifestTable,
+        part: u64,
+    ) -> Result<Option<PathBuf>, DatasetError> {
+        let path = self.part(&table.name, part);
+        match self.state(manifest, &table.name, part, CheckDepth::Footer) {
+            State::There { .. } => Ok(Some(path)),
+            State::Missing => Ok(None),
+            fault => Err(self.fault(&path, fault)),
+        }
     }
 
     /// The error for a damaged or foreign file with the name of a part.

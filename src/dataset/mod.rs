@@ -42,7 +42,7 @@ pub(crate) use metadata_limits::coded;
 pub(crate) use metadata_limits::{check_footer, check_pages};
 pub use part::encode;
 pub use session::{Concurrency, Holder, Session};
-pub use state::{CheckDepth, State};
+pub use state::{CheckDepth, PROGRAM, State};
 pub use statistics::{Counts, MAX_KEPT_ROWS, Row as StatisticsRow, TableStatistics};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

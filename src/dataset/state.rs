@@ -83,6 +83,11 @@ fn open(path: &Path) -> Result<Option<File>, State> {
         Ok(Ok(file)) => Ok(Some(file)),
         Ok(Err(found)) => Err(stranger(found)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        // It may be intact.
+        Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+            let expected = "a file that this user can read".to_owned();
+            Err(State::Foreign { what: "user", expected, found: error.to_string() })
+        }
         Err(error) => damaged(&unreadable(&error)),
     }
 }
@@ -110,9 +115,12 @@ fn unreadable(error: &io::Error) -> String {
     format!("it cannot be read: {error}")
 }
 
+/// What is foreign about a file of another program, such as a part that a user edited.
+pub const PROGRAM: &str = "program";
+
 /// The state of a file of another program.
 fn stranger(found: &str) -> State {
-    State::Foreign { what: "program", expected: "a part that slipsweep wrote".to_owned(), found: found.to_owned() }
+    State::Foreign { what: PROGRAM, expected: "a part that slipsweep wrote".to_owned(), found: found.to_owned() }
 }
 
 fn damaged<T>(why: &str) -> Result<T, State> {

@@ -43,9 +43,9 @@ const UNITS: [(&str, &str, Size); 17] = [
     ("mu_0 sigma l/v_0", "J s/m^3", |s| s.mu_0 * s.normal_stress * s.l / s.v_0),
     ("l", "m", |s| s.l),
     ("v_0^2/l", "m/s^2", |s| s.v_0 * s.v_0 / s.l),
-    // A coefficient relative to the duration has the same value in both systems, since theta is in l/v_0.
-    ("1/t_f", "1/t_f", |_| 1.0),
-    ("1/t_f^2", "1/t_f^2", |_| 1.0),
+    // A coefficient of theta relative to the duration alone stays in l/v_0, and has the same value in both systems.
+    ("1/t_f", "(l/v_0)/t_f", |_| 1.0),
+    ("1/t_f^2", "(l/v_0)/t_f^2", |_| 1.0),
     // The unit differs from row to row: the table converts it.
     ("1; (v_0/l)^2 for bounded_velocity", "1; 1/s^2 for bounded_velocity", |_| 1.0),
 ];

@@ -196,6 +196,8 @@ pub fn axis(column: &str, of: &str, power: i32) -> String {
     let name = match (column, of) {
         ("alpha_2", "1/t_f") => return "*α*_{2} *t*_{f}".to_owned(),
         ("alpha_3", "1/t_f^2") => return "*α*_{3} *t*_{f}^{2}".to_owned(),
+        ("alpha_2", "(l/v_0)/t_f") => return "*α*_{2} *t*_{f} (*l*/*v*_{0})".to_owned(),
+        ("alpha_3", "(l/v_0)/t_f^2") => return "*α*_{3} *t*_{f}^{2} (*l*/*v*_{0})".to_owned(),
         ("gap", _) => "gap (*W* − *W*∗)/*W*∗".to_owned(),
         _ => name(column),
     };
@@ -293,12 +295,14 @@ mod tests {
         assert_eq!(axis("t_f", "l/v_0", -6), "*t*_{f} (10^{−6} *l*/*v*_{0})");
         assert_eq!(axis("m", "mu_0 sigma l/v_0^2", 0), "*m* (*μ*_{0} *σ* *l*/*v*_{0}^{2})");
         assert_eq!(axis("alpha_2", "1/t_f", 0), "*α*_{2} *t*_{f}");
+        assert_eq!(axis("alpha_2", "(l/v_0)/t_f", 0), "*α*_{2} *t*_{f} (*l*/*v*_{0})");
         assert_eq!(axis("terminal_error", "1", 0), "terminal error");
         assert_eq!(axis("k", "Pa/m", 3), "*k* (10^{3} Pa/m)");
         assert_eq!(axis("m", "kg/m^2", 0), "*m* (kg/m^{2})");
         assert_eq!(equation("v_i", "3×10^{−9}", "m/s"), "*v*_{i} = 3×10^{−9} m/s");
         assert_eq!(equation("v_i", "3", "v_0"), "*v*_{i} = 3 *v*_{0}");
         assert_eq!(equation("alpha_2", "−0.12", "1/t_f"), "*α*_{2} = −0.12/*t*_{f}");
+        assert_eq!(equation("alpha_2", "−0.12", "(l/v_0)/t_f"), "*α*_{2} = −0.12 (*l*/*v*_{0})/*t*_{f}");
         assert_eq!(equation("k", "∞", "Pa/m"), "*k* = ∞");
     }
 

@@ -6,13 +6,15 @@ use std::ops::ControlFlow;
 use sqlparser::ast::helpers::attached_token::AttachedToken;
 use sqlparser::ast::{
     BinaryOperator, CaseWhen, CastKind, DataType, DuplicateTreatment, Expr, Function, FunctionArg, FunctionArgExpr,
-    FunctionArguments, Ident, JoinConstraint, JoinOperator, ObjectName, ObjectNamePart, OrderByKind, Query, Select,
-    SelectItem, SetExpr, Statement, TableFactor, UnaryOperator, Value, ValueWithSpan,
+    FunctionArgumentList, FunctionArguments, GroupByExpr, Ident, JoinConstraint, JoinOperator, NamedWindowDefinition,
+    NamedWindowExpr, ObjectName, ObjectNamePart, OrderByExpr, OrderByKind, Query, Select, SelectItem, SetExpr,
+    Statement, TableFactor, UnaryOperator, Value, ValueWithSpan, WindowType,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 
 use super::Source;
+use super::units::{Columns, units};
 use super::walk::{Visit, walk};
 use crate::names::hint;
 
@@ -21,7 +23,7 @@ pub struct CheckedQuery {
     /// The query in the dialect of polars.
     pub query: Box<Query>,
     /// The known units of its columns, by name.
-    pub units: Vec<(String, String)>,
+    pub units: Columns,
 }
 
 /// The fault of a query, and its help.
@@ -82,14 +84,16 @@ impl CheckedQuery {
                 }
             });
         };
-        let mut check = Check { sources, tables: HashSet::new(), fault: None };
+        let mut check = Check { sources, tables: HashSet::new(), windows: HashSet::new(), fault: None };
         walk(query.as_mut(), &mut check);
         if let Some(fault) = check.fault {
             return Err(fault);
         }
         let words = sources.iter().flat_map(|source| source.words.iter().cloned()).collect();
         walk(query.as_mut(), &mut Names);
-        let units = units(&query, sources);
+        let columns = |source: &Source| source.columns.iter().cloned().zip(source.units.iter().cloned()).collect();
+        let tables = sources.iter().map(|source| (source.name.clone(), columns(source))).collect();
+        let units = units(&query, &tables);
         walk(query.as_mut(), &mut PolarsDialect { words });
         Ok(CheckedQuery { query, units })
     }
@@ -100,10 +104,19 @@ struct Check<'a> {
     sources: &'a [Source],
     /// Names of tables that the query defines itself.
     tables: HashSet<String>,
+    /// Names of windows with an order.
+    windows: HashSet<String>,
     fault: Option<InvalidQuery>,
 }
 
 impl Check<'_> {
+    fn is_ordered(&self, window: &WindowType) -> bool {
+        match window {
+            WindowType::WindowSpec(window) => !window.order_by.is_empty(),
+            WindowType::NamedWindow(name) => self.windows.contains(&name.value),
+        }
+    }
+
     fn refuse(&mut self, fault: InvalidQuery) -> ControlFlow<()> {
         self.fault = Some(fault);
         ControlFlow::Break(())
@@ -138,7 +151,14 @@ impl Visit for Check<'_> {
                 "count(*) counts rows; name a column for other aggregates",
             ));
         }
-        ControlFlow::Continue(())
+        match &function.over {
+            // polars would ignore the order.
+            Some(window) if self.is_ordered(window) && !is_one_of(ORDERED, function) => self.refuse(InvalidQuery::new(
+                format!("`{expression}`: no running `{}`", function.name),
+                "leave ORDER BY out; these take it: row_number, lag, lead, first_value, last_value, sum, count, min, max",
+            )),
+            _ => ControlFlow::Continue(()),
+        }
     }
 
     fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
@@ -149,6 +169,25 @@ impl Visit for Check<'_> {
             return self.refuse(InvalidQuery::new(
                 format!("ON {condition}: an outer join compares columns with columns by ="),
                 "filter in a subquery: FROM a LEFT JOIN (SELECT * FROM b WHERE ...) AS b ON a.x = b.x",
+            ));
+        }
+        for NamedWindowDefinition(name, window) in &select.named_window {
+            if matches!(window, NamedWindowExpr::WindowSpec(window) if !window.order_by.is_empty()) {
+                self.windows.insert(name.value.clone());
+            }
+        }
+        if let Some(function) = select.selection.as_ref().and_then(first_aggregate) {
+            return self.refuse(InvalidQuery::new(
+                format!("WHERE contains the aggregate `{function}`, but it selects single rows"),
+                "write the condition in HAVING, after GROUP BY; for OVER, filter a subquery: FROM (SELECT ...) AS t WHERE ...",
+            ));
+        }
+        let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
+        let windows = || select.projection.iter().filter_map(expression).chain(&select.qualify).find_map(first_window);
+        if let Some(window) = Some(()).filter(|()| is_grouped).and_then(|()| windows()) {
+            return self.refuse(InvalidQuery::new(
+                format!("`{window}`: OVER beside GROUP BY"),
+                "group in a subquery: SELECT ... OVER (...) FROM (SELECT ... GROUP BY ...) AS t",
             ));
         }
         if select.into.is_some() {
@@ -189,23 +228,80 @@ impl Visit for Check<'_> {
     }
 }
 
+/// Window functions that follow the order of their window.
+const ORDERED: &str = "row_number lag lead first_value last_value sum count min max";
+
+/// Whether a SELECT has no GROUP BY.
+fn is_empty(group_by: &GroupByExpr) -> bool {
+    matches!(group_by, GroupByExpr::Expressions(keys, _) if keys.is_empty())
+}
+
+/// The expression of an item of SELECT.
+fn expression(item: &SelectItem) -> Option<&Expr> {
+    match item {
+        SelectItem::UnnamedExpr(expression) | SelectItem::ExprWithAlias { expr: expression, .. } => Some(expression),
+        _ => None,
+    }
+}
+
+/// The first function outside subqueries for which `wanted` holds, as text.
+fn first_function(expression: &Expr, wanted: fn(&Function) -> bool) -> Option<String> {
+    struct Search {
+        wanted: fn(&Function) -> bool,
+        depth: u32,
+        found: Option<String>,
+    }
+    impl Visit for Search {
+        fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
+            self.depth += 1;
+            ControlFlow::Continue(())
+        }
+
+        fn after_query(&mut self) {
+            self.depth -= 1;
+        }
+
+        fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+            match expression {
+                Expr::Function(function) if self.depth == 0 && (self.wanted)(function) => {
+                    self.found = Some(function.to_string());
+                    ControlFlow::Break(())
+                }
+                _ => ControlFlow::Continue(()),
+            }
+        }
+    }
+    let mut search = Search { wanted, depth: 0, found: None };
+    walk(&mut expression.clone(), &mut search);
+    search.found
+}
+
+fn first_window(expression: &Expr) -> Option<String> {
+    first_function(expression, |function| function.over.is_some())
+}
+
+/// The first aggregate or window function of an expression.
+fn first_aggregate(expression: &Expr) -> Option<String> {
+    first_function(expression, |function| function.over.is_some() || is_aggregate(function))
+}
+
+/// Whether a function reduces the rows of a group to one value.
+pub fn is_aggregate(function: &Function) -> bool {
+    is_one_of(AGGREGATE_FUNCTIONS, function)
+        || is_one_of("array_agg corr count covar covar_samp first last string_agg var_samp", function)
+}
+
 /// Aggregates that polars applies to a constant as if it were one row.
 const AGGREGATE_FUNCTIONS: &str = "avg max mean median min quantile_cont quantile_disc stddev stdev sum var variance";
 
-/// The condition of a join that keeps or selects rows without a match.
+/// The condition of a join that keeps rows without a match.
 fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
     match join {
         JoinOperator::Left(constraint)
         | JoinOperator::LeftOuter(constraint)
         | JoinOperator::Right(constraint)
         | JoinOperator::RightOuter(constraint)
-        | JoinOperator::FullOuter(constraint)
-        | JoinOperator::Semi(constraint)
-        | JoinOperator::LeftSemi(constraint)
-        | JoinOperator::RightSemi(constraint)
-        | JoinOperator::Anti(constraint)
-        | JoinOperator::LeftAnti(constraint)
-        | JoinOperator::RightAnti(constraint) => match constraint {
+        | JoinOperator::FullOuter(constraint) => match constraint {
             JoinConstraint::On(condition) => Some(condition),
             _ => None,
         },
@@ -244,6 +340,15 @@ fn is_constant(expression: &Expr) -> bool {
 struct Names;
 
 impl Visit for Names {
+    fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
+        if let Some(mut having) = select.having.take() {
+            let keys = Keys::of(select);
+            walk(&mut having, &mut HavingTerms { keys: &keys, projection: &select.projection, inside: 0 });
+            select.having = Some(having);
+        }
+        ControlFlow::Continue(())
+    }
+
     fn query(&mut self, query: &mut Query) -> ControlFlow<()> {
         let SetExpr::Select(select) = query.body.as_mut() else { return ControlFlow::Continue(()) };
         let mut taken: HashSet<String> = HashSet::new();
@@ -290,6 +395,91 @@ impl Visit for Names {
     }
 }
 
+/// The expressions of GROUP BY; a name that stands for an item of SELECT also as that item.
+struct Keys(Vec<Expr>);
+
+impl Keys {
+    fn of(select: &Select) -> Keys {
+        let items = || select.projection.iter().filter_map(expression).filter(|item| first_aggregate(item).is_none());
+        let GroupByExpr::Expressions(keys, _) = &select.group_by else { return Keys(items().cloned().collect()) };
+        let place = |key: &Expr| match key {
+            Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse::<usize>().ok(),
+            _ => None,
+        };
+        let numbered = keys.iter().filter_map(place).filter_map(|place| select.projection.get(place.checked_sub(1)?));
+        let named = keys.iter().filter_map(|key| meaning(key, &select.projection));
+        let written = keys.iter().filter(|key| place(key).is_none());
+        Keys(written.chain(named).chain(numbered.filter_map(expression)).cloned().collect())
+    }
+}
+
+/// The item of SELECT that a name stands for.
+fn meaning<'a>(name: &Expr, projection: &'a [SelectItem]) -> Option<&'a Expr> {
+    let Expr::Identifier(name) = name else { return None };
+    projection.iter().find_map(|item| match item {
+        SelectItem::ExprWithAlias { expr, alias } if alias.value == name.value => Some(expr),
+        _ => None,
+    })
+}
+
+/// The visitor that writes HAVING in aggregates of the columns of the table: polars does not know the keys of the groups there, nor other names
+/// beside aggregates.
+struct HavingTerms<'a> {
+    keys: &'a Keys,
+    projection: &'a [SelectItem],
+    /// Depth in aggregates and subqueries, whose columns keep their meaning.
+    inside: u32,
+}
+
+impl Visit for HavingTerms<'_> {
+    fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
+        self.inside += 1;
+        ControlFlow::Continue(())
+    }
+
+    fn after_query(&mut self) {
+        self.inside -= 1;
+    }
+
+    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        if self.inside == 0 {
+            let least = |key: &Expr| Expr::Function(aggregate("min", key.clone()));
+            if self.keys.0.contains(expression) {
+                *expression = least(expression);
+            } else if let Some(item) = meaning(expression, self.projection) {
+                *expression =
+                    if first_aggregate(item).is_some() { Expr::Nested(Box::new(item.clone())) } else { least(item) };
+            }
+        }
+        self.inside += u32::from(matches!(expression, Expr::Function(function) if is_aggregate(function)));
+        ControlFlow::Continue(())
+    }
+
+    fn after(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        self.inside -= u32::from(matches!(expression, Expr::Function(function) if is_aggregate(function)));
+        ControlFlow::Continue(())
+    }
+}
+
+/// The aggregate `called` of an expression.
+fn aggregate(called: &str, argument: Expr) -> Function {
+    let list = FunctionArgumentList {
+        duplicate_treatment: None,
+        args: vec![FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))],
+        clauses: Vec::new(),
+    };
+    Function {
+        name: ObjectName::from(vec![Ident::new(called)]),
+        uses_odbc_syntax: false,
+        parameters: FunctionArguments::None,
+        args: FunctionArguments::List(list),
+        filter: None,
+        null_treatment: None,
+        over: None,
+        within_group: Vec::new(),
+    }
+}
+
 /// The name of a column without `AS`, as in DuckDB; `count(*)` is `count`.
 pub fn name(expression: &Expr) -> String {
     match expression {
@@ -324,62 +514,8 @@ pub fn name(expression: &Expr) -> String {
     }
 }
 
-/// The units of the columns of a query, by name.
-fn units(query: &Query, sources: &[Source]) -> Vec<(String, String)> {
-    let mut units = Vec::new();
-    let mut body = query.body.as_ref();
-    while let SetExpr::SetOperation { left, .. } = body {
-        body = left;
-    }
-    let SetExpr::Select(select) = body else { return units };
-    for item in &select.projection {
-        match item {
-            SelectItem::UnnamedExpr(expression) => units.push((name(expression), unit(expression, sources))),
-            SelectItem::ExprWithAlias { expr, alias } => units.push((alias.value.clone(), unit(expr, sources))),
-            _ => {
-                for column in sources.iter().flat_map(|source| &source.columns) {
-                    units.push((column.clone(), column_unit(column, sources)));
-                }
-            }
-        }
-    }
-    units
-}
-
-/// The unit of a column, if all tables that have it agree.
-fn column_unit(name: &str, sources: &[Source]) -> String {
-    let known = sources.iter().flat_map(|source| source.columns.iter().zip(&source.units));
-    let mut known = known.filter(|(column, _)| *column == name).map(|(_, unit)| unit);
-    match known.next() {
-        Some(first) if known.all(|other| other == first) => first.clone(),
-        _ => String::new(),
-    }
-}
-
-/// The unit of an expression that has the unit of one column.
-fn unit(expression: &Expr, sources: &[Source]) -> String {
-    match expression {
-        Expr::Identifier(name) => column_unit(&name.value, sources),
-        Expr::CompoundIdentifier(names) => match names.as_slice() {
-            [.., column] => column_unit(&column.value, sources),
-            [] => String::new(),
-        },
-        Expr::Nested(inner) | Expr::UnaryOp { expr: inner, .. } | Expr::Cast { expr: inner, .. } => {
-            unit(inner, sources)
-        }
-        Expr::Function(function) => {
-            const UNIT_PRESERVING: &str =
-                "min max avg mean sum median first last abs quantile_cont quantile_disc stddev";
-            match first_argument(function) {
-                Some(inner) if is_one_of(UNIT_PRESERVING, function) => unit(inner, sources),
-                _ => String::new(),
-            }
-        }
-        _ => String::new(),
-    }
-}
-
-fn first_argument(function: &Function) -> Option<&Expr> {
+/// The first argument of a function.
+pub fn first_argument(function: &Function) -> Option<&Expr> {
     let FunctionArguments::List(list) = &function.args else { return None };
     match list.args.first()? {
         FunctionArg::Unnamed(FunctionArgExpr::Expr(inner)) => Some(inner),
@@ -416,6 +552,15 @@ pub fn cast(expression: Expr, data_type: DataType) -> Expr {
 }
 
 impl Visit for PolarsDialect {
+    fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
+        for NamedWindowDefinition(_, window) in &mut select.named_window {
+            if let NamedWindowExpr::WindowSpec(window) = window {
+                order_nulls(&mut window.order_by);
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
     fn after(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         match expression {
             Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => *digits = plain(digits),
@@ -433,6 +578,9 @@ impl Visit for PolarsDialect {
                 self.as_text(right);
             }
             Expr::InList { list, .. } => numbers_alike(list),
+            // polars would return null for null.
+            Expr::IsNotTrue(inner) => *expression = or_null(inner, Some(UnaryOperator::Not)),
+            Expr::IsNotFalse(inner) => *expression = or_null(inner, None),
             Expr::Function(function) => {
                 self.function(function);
                 if let Some(sum) = sum(function) {
@@ -445,8 +593,42 @@ impl Visit for PolarsDialect {
     }
 }
 
+/// Whether `condition`, after `operator`, is true or null.
+fn or_null(condition: &Expr, operator: Option<UnaryOperator>) -> Expr {
+    let condition = Box::new(Expr::Nested(Box::new(condition.clone())));
+    let is_null = Box::new(Expr::IsNull(condition.clone()));
+    let holds = match operator {
+        Some(op) => Box::new(Expr::UnaryOp { op, expr: condition }),
+        None => condition,
+    };
+    Expr::Nested(Box::new(Expr::BinaryOp { left: is_null, op: BinaryOperator::Or, right: holds }))
+}
+
+/// Gives the nulls of the first key of a window their place. polars puts them first in either direction.
+fn order_nulls(keys: &mut Vec<OrderByExpr>) {
+    let Some(first) = keys.first().cloned() else { return };
+    let descends = first.options.asc == Some(false);
+    let nulls_first = first.options.nulls_first.unwrap_or(descends);
+    // Of 0 and 1, the one that comes first in this direction.
+    let place =
+        |comes_first: bool| Box::new(Expr::value(Value::Number(u8::from(comes_first == descends).to_string(), false)));
+    let null = CaseWhen { condition: Expr::IsNull(Box::new(first.expr.clone())), result: *place(nulls_first) };
+    let expr = Expr::Case {
+        case_token: AttachedToken::empty(),
+        end_token: AttachedToken::empty(),
+        operand: None,
+        conditions: vec![null],
+        else_result: Some(place(!nulls_first)),
+    };
+    keys.insert(0, OrderByExpr { expr, ..first });
+    keys.iter_mut().for_each(|key| key.options.nulls_first = None);
+}
+
 impl PolarsDialect {
     fn function(&self, function: &mut Function) {
+        if let Some(WindowType::WindowSpec(window)) = &mut function.over {
+            order_nulls(&mut window.order_by);
+        }
         let called = function.name.to_string().to_lowercase();
         let FunctionArguments::List(list) = &mut function.args else { return };
         // A constant has a value in every row.

@@ -11,6 +11,7 @@ mod groups;
 mod scan;
 mod source;
 mod streaming;
+mod units;
 mod walk;
 
 use std::path::Path;
@@ -150,10 +151,13 @@ impl Tables {
             return self.refuse(format!("no column `{name}`"), &help);
         }
         // Names of types and of nodes of the syntax tree of polars mean nothing to a user.
-        let is_internal = line.contains("Query {") || line.contains(" { ") && line.contains("expression");
+        let is_internal = line.contains("Query {")
+            || line.starts_with("join type")
+            || line.contains(" { ") && line.contains("expression");
         if is_internal {
-            let found = "a part of the query is not supported, such as EXISTS or a subquery in an expression";
-            return self.refuse(found.to_owned(), "write it as a join, or with WITH");
+            let found =
+                "a part of the query is not supported, such as EXISTS, SEMI JOIN or a subquery in an expression";
+            return self.refuse(found.to_owned(), "write it as a join, with IN, or with WITH");
         }
         let known = |sign: &str| line.contains(sign);
         let (found, help) = if known("GROUP BY clause") {

@@ -12,6 +12,9 @@ pub trait Visit {
         ControlFlow::Continue(())
     }
 
+    /// Called after the parts of a query.
+    fn after_query(&mut self) {}
+
     /// Called before the parts of a SELECT.
     fn select(&mut self, _: &mut Select) -> ControlFlow<()> {
         ControlFlow::Continue(())
@@ -40,6 +43,11 @@ impl VisitorMut for Walk<'_> {
 
     fn pre_visit_query(&mut self, query: &mut Query) -> ControlFlow<()> {
         self.0.query(query)
+    }
+
+    fn post_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
+        self.0.after_query();
+        ControlFlow::Continue(())
     }
 
     fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {

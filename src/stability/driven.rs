@@ -9,10 +9,11 @@
 //!
 //! and the target is 0. Without mass the last equation is a constraint. With a rigid spring, `v = v_c`.
 
+use super::sensitivity::MIN_PATH_RTOL;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
-use crate::protocol::compliant::CompliantPath;
+use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::OpenLoopResult;
 
@@ -35,18 +36,43 @@ pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     OpenLoopResult { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
-/// Distance from the target at `t_f`, as in [`open_loop_error`], if `v_c` is sampled at `0`, `dt`, `2 dt`, … and held.
+/// Distance from the target at `t_f`, as in [`open_loop_error`], if `v_c` of the shortcut from `v_i` to `v_f` in `t_f` is sampled at `0`, `dt`,
+/// `2 dt`, … and held. The error is up to `rtol` of 1 + the distance.
 ///
-/// `None` for more than 100,000 samples, and where the simulation does not reach `t_f`, most often because a held `v_c`
-/// stops the block or makes it unstable.
-pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
-    let t_f = path.duration();
+/// `None` without a shortcut, for more than 100,000 samples, where the simulation does not reach `t_f`, most often because a held `v_c` stops the
+/// block or makes it unstable, and where a finer simulation of a more accurate shortcut does not agree.
+pub fn held_error(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, dt: f64, rtol: f64) -> OpenLoopResult {
     let samples = (t_f / dt).ceil().max(1.0);
     if samples.is_nan() || samples > MAX_SAMPLES {
         return OpenLoopResult { number: None, steps: 0 };
     }
-    let (slider, count) = (&path.slider, samples as u32);
-    let sample = |i: u32| slider.control(&path.at_time(f64::from(i) * dt));
+    let mut steps = 0;
+    let mut distance = |rtol: f64, parts: f64, shift: f64| {
+        let path = compliant::path(slider, velocities, t_f, (PATH_ACCURACY * rtol).max(MIN_PATH_RTOL)).ok()?;
+        let sample = |t: f64| (1.0 + shift) * slider.control(&path.at_time(t));
+        held_distance(&path, dt, samples as u32, sample, (rtol, parts), &mut steps)
+    };
+    // Where errors grow, the shift of the control grows with them; steps may stay on an unstable motion by symmetry.
+    let shift = (SHIFT * rtol).max(MIN_SHIFT);
+    let number = distance(rtol, 1.0, shift).and_then(|shifted| {
+        let distance = distance(FINER * rtol, PARTS, 0.0)?;
+        ((shifted - distance).abs() <= rtol * (1.0 + distance)).then_some(distance)
+    });
+    OpenLoopResult { number, steps }
+}
+
+/// One simulation of [`held_error`] to `rtol`, under the control velocity `sample` of a time; adds its steps to `steps`. The first step after a
+/// sample is at most one of `parts` equal parts of the time to the next.
+fn held_distance(
+    path: &CompliantPath,
+    dt: f64,
+    count: u32,
+    sample: impl Fn(f64) -> f64,
+    (rtol, parts): (f64, f64),
+    steps: &mut u32,
+) -> Option<f64> {
+    let (slider, t_f) = (&path.slider, path.duration());
+    let sample = |i: u32| sample(f64::from(i) * dt);
     // In units of t_f.
     let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
     if slider.k == f64::INFINITY {
@@ -57,7 +83,7 @@ pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
             let aged = -exp_m1(-t_f * (time(i + 1) - time(i)) * v);
             theta += (1.0 / v - theta) * aged;
         }
-        return OpenLoopResult { number: Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)])), steps: 0 };
+        return Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)]));
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
     let mut budget = MAX_STEPS;
@@ -65,10 +91,25 @@ pub fn held_error(path: &CompliantPath, dt: f64, rtol: f64) -> OpenLoopResult {
     for i in 0..count {
         let Some((state, h)) = state_and_step else { break };
         driven.control = Control::Held(sample(i));
-        state_and_step = driven.follow(state, (time(i), time(i + 1)), h, rtol, &mut budget);
+        let most = (time(i + 1) - time(i)) / parts;
+        state_and_step = driven.follow(state, (time(i), time(i + 1)), h.min(most), rtol, &mut budget);
     }
-    OpenLoopResult { number: state_and_step.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
+    *steps += MAX_STEPS - budget;
+    state_and_step.map(|(state, _)| driven.distance(&state))
 }
+
+/// Accuracy of the shortcut, in units of `rtol`. Chosen: its acceleration, which the control contains, has two digits less than its velocity.
+const PATH_ACCURACY: f64 = 0.01;
+
+/// Tolerance of the second simulation, relative to the first, and parts of a sampling interval. Chosen: its error is that of the first to a digit,
+/// also where one step of the first crosses a fast relaxation.
+const FINER: f64 = 0.1;
+const PARTS: f64 = 8.0;
+
+/// Relative shift of the control velocity in the first simulation: in units of `rtol`, and at least. Chosen: small enough for a control that is
+/// the difference of large terms, and a few roundings.
+const SHIFT: f64 = 1e-4;
+const MIN_SHIFT: f64 = 1e-15;
 
 /// First step, in units of `t_f`. Chosen: step-size control shortens it.
 const FIRST_STEP: f64 = 1e-3;

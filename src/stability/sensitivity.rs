@@ -43,7 +43,7 @@ pub fn amplification(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, rto
 const PATH_ACCURACY: f64 = 1e-5;
 
 /// Tightest accuracy of the shortcut: that of the solver.
-const MIN_PATH_RTOL: f64 = 1e-13;
+pub(super) const MIN_PATH_RTOL: f64 = 1e-13;
 
 /// Amplification below which 0 is returned. Chosen: such an error is below every rounding of a protocol that a computer drives.
 const MIN_AMPLIFICATION: f64 = 1e-12;

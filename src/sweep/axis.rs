@@ -120,7 +120,7 @@ impl AxisDraft<'_> {
     fn scale_of(self, form: &AxisForm) -> Result<Scale, SpecError> {
         let Some(unit) = &form.unit else { return Ok(Scale::Model) };
         let known = self.quantity.scales();
-        let name = |scale: Scale| self.units.name(self.quantity.unit(scale));
+        let name = |scale: Scale| unit_name(self.units, self.quantity, scale);
         known.iter().copied().find(|scale| name(*scale) == unit).ok_or_else(|| {
             let units: Vec<String> = known.iter().map(|scale| format!("\"{}\"", name(*scale))).collect();
             let (key, help) = (format!("{}.unit", self.key), "correct the unit, or remove it");
@@ -253,4 +253,10 @@ impl AxisDraft<'_> {
         let (scale, seed) = (self.scale, seed.transpose()?);
         Ok(Written::Sampled(Sampled { scale, design, least, greatest, count: count as u64, seed }))
     }
+}
+
+/// The word of a spec for the unit of values in `scale`; relative to the duration it is the same in any units.
+pub fn unit_name(units: &Units, quantity: Quantity, scale: Scale) -> &'static str {
+    let unit = quantity.unit(scale);
+    if scale == Scale::Duration { unit } else { units.name(unit) }
 }

@@ -352,7 +352,9 @@ fn unknown_column(place: &impl Display, name: &str) -> SpecError {
 fn is_misspelt(name: &str) -> bool {
     let plain = |name: &str| name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
     let name = plain(name);
-    Quantity::ALL.iter().map(|axis| plain(axis.name())).any(|axis| strsim::damerau_levenshtein(&axis, &name) <= 1)
+    // A letter away from a symbol is another symbol.
+    let is_near = |axis: String| axis == name || axis.len() > 2 && strsim::damerau_levenshtein(&axis, &name) <= 1;
+    Quantity::ALL.iter().map(|axis| plain(axis.name())).any(is_near)
 }
 
 /// Whether `name` is reserved in tables or in SQL.

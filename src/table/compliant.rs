@@ -38,8 +38,8 @@ fields! { Row:
          null where two runs differ by more than rtol, beyond 3000 steps of a run and beyond the range of doubles"
         => |row| number(row.amplification);
     sampling_error "1"
-        "distance from the final steady state in that norm if v_c is sampled every dt and held; absolute error up to rtol; null for \
-         dt = 0, beyond 100000 samples, and if the simulation does not reach t_f"
+        "distance from the final steady state in that norm if v_c is sampled every dt and held; error up to rtol (1 + sampling_error); \
+         null for dt = 0, beyond 100000 samples, if the simulation does not reach t_f, and where two differ by more"
         => |row| number(row.sampling_error);
     stiffness_ratio "1" "k t_f^2/m: the spring is nearly rigid if this is large; inf for m = 0"
         => |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY };
@@ -92,12 +92,10 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
         let is_held = job.projection.has(SAMPLING_ERROR) && dt > 0.0;
         let is_followed = job.projection.has(OPEN_LOOP_ERROR);
-        let path =
-            (is_held || is_followed).then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
-        let sampling_error =
-            path.as_ref().filter(|_| is_held).and_then(|path| value_of(held_error(path, dt, job.rtol), &mut work));
-        let open_loop_error =
-            path.as_ref().filter(|_| is_followed).and_then(|path| value_of(open_loop_error(path, job.rtol), &mut work));
+        let held = is_held.then(|| held_error(&slider, velocities(point), t_f, dt, job.rtol));
+        let sampling_error = held.and_then(|held| value_of(held, &mut work));
+        let path = is_followed.then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
+        let open_loop_error = path.and_then(|path| value_of(open_loop_error(&path, job.rtol), &mut work));
         (
             status,
             Some(Row { member, slider, t_f, least, amplification, sampling_error, open_loop_error, work_error }),

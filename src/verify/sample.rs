@@ -1,9 +1,8 @@
 //! A reproducible sample of the rows of a table.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
-use crate::dataset::{Folder, ManifestTable, Row, frame};
+use crate::dataset::{CheckDepth, Folder, Manifest, ManifestTable, PROGRAM, Row, State, frame};
 
 /// Steele, Lea and Flood's SplitMix64 (OOPSLA 2014): a counter, scrambled.
 fn next(state: &mut u64) -> u64 {
@@ -28,7 +27,13 @@ fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
 }
 
 /// The present rows of the sample, with their global numbers, and the number of rows in missing parts.
-pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Result<(Vec<(u64, Row)>, u64), String> {
+pub fn rows(
+    folder: &Folder,
+    manifest: &Manifest,
+    table: &ManifestTable,
+    count: u64,
+    seed: u64,
+) -> Result<(Vec<(u64, Row)>, u64), String> {
     let chosen = choose(table.rows, count, seed);
     let (mut found, mut missing, mut first_missing) = (Vec::new(), 0, None);
     let numbers: BTreeSet<u64> = chosen.iter().map(|row| row / table.rows_per_part.max(1)).collect();
@@ -36,13 +41,21 @@ pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Re
         let range = table.rows_of(part);
         let inside: Vec<u64> = chosen.range(range.clone()).map(|row| row - range.start).collect();
         let path = folder.part(&table.name, part);
-        if !path.is_file() {
-            missing += inside.len() as u64;
-            first_missing.get_or_insert(path);
-            continue;
+        match folder.state(manifest, &table.name, part, CheckDepth::Footer) {
+            // The numbers of an edited part are compared, too.
+            State::There { .. } | State::Damaged { .. } | State::Foreign { what: PROGRAM, .. } => {}
+            State::Missing => {
+                missing += inside.len() as u64;
+                first_missing.get_or_insert(path);
+                continue;
+            }
+            fault => return Err(folder.fault(&path, fault).to_string()),
         }
-        let cells = read(&path, &inside, range.end - range.start)?;
-        found.extend(inside.iter().map(|row| row + range.start).zip(cells));
+        let (frame, expected) = (frame::read_all(&path).map_err(|error| error.to_string())?, range.end - range.start);
+        if frame.height as u64 != expected {
+            return Err(format!("{}: {} rows; the manifest lists {expected}", path.display(), frame.height));
+        }
+        found.extend(inside.iter().map(|row| (row + range.start, frame.row(*row as usize))));
     }
     match first_missing {
         Some(path) if found.is_empty() => Err(format!(
@@ -51,12 +64,4 @@ pub fn rows(folder: &Folder, table: &ManifestTable, count: u64, seed: u64) -> Re
         )),
         _ => Ok((found, missing)),
     }
-}
-
-fn read(path: &Path, rows: &[u64], expected: u64) -> Result<Vec<Row>, String> {
-    let frame = frame::read_all(path).map_err(|error| error.to_string())?;
-    if frame.height as u64 != expected {
-        return Err(format!("{}: {} rows; the manifest lists {expected}", path.display(), frame.height));
-    }
-    Ok(rows.iter().map(|&row| frame.row(row as usize)).collect())
 }

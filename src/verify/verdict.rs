@@ -30,7 +30,7 @@ pub struct Difference {
     pub column: &'static str,
     /// Relative difference; infinite where only one route has a number.
     pub size: f64,
-    /// The value of the independent route, as text.
+    /// The value of the independent route, and what `size` is relative to unless that is this value, as text.
     pub expected: String,
 }
 
@@ -73,7 +73,13 @@ impl Verdict {
         };
         // A number that cannot be compared is an error, not an agreement.
         let size = if difference.is_nan() { f64::INFINITY } else { difference };
-        let expected = expected.map_or_else(|| "nothing".to_owned(), |expected| format!("{expected:?}"));
+        let expected = match (expected, scale) {
+            (Some(expected), Some(scale)) if (scale / expected.abs() - 1.0).abs() > SAME_SCALE => {
+                format!("{expected:?}, relative to {scale:.3e}")
+            }
+            (Some(expected), _) => format!("{expected:?}"),
+            (None, _) => "nothing".to_owned(),
+        };
         self.differences.push(Difference { column, size, expected });
     }
 
@@ -120,6 +126,9 @@ impl Verdict {
         self.judge(STATUS, holds, if expected { name } else { other });
     }
 }
+
+/// Relative difference of a scale from the number below which it is not stated. Chosen: it does not change the shown digits of a difference.
+const SAME_SCALE: f64 = 1e-3;
 
 /// The status of a path with friction below 0.
 pub const NEGATIVE: &str = "negative_friction";

@@ -344,6 +344,10 @@ fn regress_answers_are_those_of_standard_sql() {
         ("WITH x AS (SELECT t_f FROM best_cubic) SELECT t_f FROM x ORDER BY t_f DESC LIMIT 1", "t_f\n0.049\n"),
         ("SELECT count(*) FROM best_cubic b LEFT JOIN optimal o ON b.t_f = o.t_f AND b.v_f = o.v_f", "count\n3\n"),
         ("SELECT count(*) FROM optimal WHERE strategy LIKE '%s%e%_%p%' AND strategy NOT LIKE '%x'", "count\n2\n"),
+        ("SELECT v_f, count(*) AS n FROM optimal GROUP BY v_f HAVING n > 1 AND v_f > 10", "v_f,n\n100.0,3\n"),
+        ("SELECT strategy AS s, count(*) AS n FROM optimal GROUP BY s HAVING s = 'speed_up'", "s,n\nspeed_up,2\n"),
+        ("SELECT v_f, count(*) AS n FROM optimal GROUP BY 1 HAVING count(*) > 1", "v_f,n\n100.0,3\n"),
+        ("SELECT t_f, max(work) AS work FROM optimal GROUP BY t_f HAVING work > 1e9", "t_f,work\n"),
     ] {
         let found = ask(question);
         assert!(found.starts_with(answer), "{question}: {found}");
@@ -358,6 +362,23 @@ fn regress_answers_are_those_of_standard_sql() {
         (
             "SELECT count(*) FROM best_cubic b LEFT JOIN optimal o ON b.t_f = o.t_f AND o.t_f < 0.03",
             "ON b.t_f = o.t_f AND o.t_f < 0.03: an outer join compares columns with columns by =",
+        ),
+        (
+            "SELECT count(*) FROM optimal WHERE max(work) > 3",
+            "WHERE contains the aggregate `max(work)`, but it selects single rows",
+        ),
+        ("SELECT avg(work) OVER (ORDER BY t_f) AS x FROM optimal", "`avg(work) OVER (ORDER BY t_f)`: no running `avg`"),
+        (
+            "SELECT avg(work) OVER w AS x FROM optimal WINDOW w AS (ORDER BY t_f)",
+            "`avg(work) OVER w`: no running `avg`",
+        ),
+        (
+            "SELECT t_f, count(*) OVER (PARTITION BY v_f) AS x FROM optimal GROUP BY t_f, v_f",
+            "`count(*) OVER (PARTITION BY v_f)`: OVER beside GROUP BY",
+        ),
+        (
+            "SELECT b.t_f FROM best_cubic b SEMI JOIN optimal o ON b.t_f = o.t_f",
+            "a part of the query is not supported, such as EXISTS, SEMI JOIN or a subquery in an expression",
         ),
     ] {
         let (code, message) = refused(folder.path(), &["query", "results/test", question]);
@@ -376,6 +397,65 @@ fn regress_answers_are_those_of_standard_sql() {
     assert_eq!(json, "{\"v_f\":100.0,\"all_of\":[0.02,0.037,0.049]}\n");
     let infinite = "SELECT 1.0 / (t_f - t_f) AS x FROM best_cubic LIMIT 1";
     assert_eq!(printed(folder.path(), &["query", "results/test", infinite, "--format", "jsonl"]), "{\"x\":\"inf\"}\n");
+}
+
+#[test]
+fn regress_a_part_in_the_place_of_another_is_refused() {
+    let folder = landscape();
+    let part = |number: u32| folder.path().join(format!("results/test/gap/part-00000{number}.parquet"));
+    fs::copy(part(0), part(1)).expect("is writable");
+    let commands: [&[&str]; 4] = [
+        &["trace", "results/test", "gap", "--row", "400000"],
+        &["verify", "results/test", "--sample", "9"],
+        &["summary", "results/test"],
+        &["head", "results/test", "gap"],
+    ];
+    for command in commands {
+        let (code, message) = refused(folder.path(), command);
+        assert!(code == 2 && message.contains("belongs to another place in the table"), "{command:?}: {message}");
+    }
+}
+
+#[test]
+fn regress_nulls_are_where_the_rules_put_them() {
+    let folder = tempfile::tempdir().expect("is writable");
+    fs::write(folder.path().join("w.csv"), "g,x,y\na,3,1\na,,2\na,1,3\nb,2,4\nb,,5\n").expect("is writable");
+    for (question, answer) in [
+        ("SELECT y, row_number() OVER (PARTITION BY g ORDER BY x) AS r FROM w", "y,r\n1,2\n2,3\n3,1\n4,1\n5,2\n"),
+        ("SELECT y, row_number() OVER (PARTITION BY g ORDER BY x DESC) AS r FROM w", "y,r\n1,2\n2,1\n3,3\n4,2\n5,1\n"),
+        (
+            "SELECT y, row_number() OVER u AS r FROM w WINDOW u AS (PARTITION BY g ORDER BY x DESC NULLS LAST) QUALIFY r = 1",
+            "y,r\n1,1\n4,1\n",
+        ),
+        ("SELECT y, sum(y) OVER (PARTITION BY g ORDER BY y DESC) AS s FROM w", "y,s\n1,6\n2,5\n3,3\n4,9\n5,5\n"),
+        ("SELECT count(*) FROM w WHERE (x > 1) IS NOT TRUE", "count\n3\n"),
+        ("SELECT count(*) FROM w WHERE (x > 1) IS NOT FALSE", "count\n4\n"),
+        ("SELECT count(*) FROM w WHERE x IN (SELECT max(x) FROM w)", "count\n1\n"),
+    ] {
+        assert_eq!(printed(folder.path(), &["query", "w.csv", question, "--format", "csv"]), answer, "{question}");
+    }
+}
+
+/// A unit comes from a column, not from its name.
+#[test]
+fn regress_units_of_subqueries() {
+    let folder = small();
+    for (question, units) in [
+        ("SELECT m, 1 AS n FROM (SELECT min(work) AS m FROM optimal) AS x", "mu_0 sigma l"),
+        ("SELECT x.t_f, x.work FROM (SELECT t_f * 1000 AS t_f, work FROM optimal) AS x", "mu_0 sigma l"),
+        (
+            "WITH t AS (SELECT v_f AS t_f, ln(work) AS work FROM optimal) SELECT t_f, min(work) FROM t GROUP BY t_f",
+            "v_0",
+        ),
+        ("SELECT v_f, t_f FROM optimal UNION ALL SELECT v_i, work FROM optimal", "v_0"),
+        ("SELECT b.*, o.work AS least FROM best_cubic b JOIN optimal o ON b.t_f = o.t_f", "l/v_0 mu_0 mu_0 v_0 v_0"),
+        ("SELECT * REPLACE (t_f * 2 AS t_f) FROM optimal", "mu_0 mu_0 v_0 v_0 v_0"),
+    ] {
+        let answer = printed(folder.path(), &["query", "results/test", question]);
+        let line = answer.lines().nth(1).unwrap_or_default();
+        let found = line.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(found == units || question.contains('*') && found.starts_with(units), "{question}: {answer}");
+    }
 }
 
 #[test]

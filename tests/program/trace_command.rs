@@ -452,6 +452,8 @@ fn a_row_without_a_path_states_why() {
         let found = complaint(arguments);
         assert!(found.starts_with(expected), "{arguments:?}: {found}");
     }
+    assert!(complaint(&["optimal", "--where", "t_f=7"]).contains("\n  found: nearest t_f = "));
+    assert!(complaint(&["optimal", "--where", "t_f>0"]).contains("help: --row 0, or a condition on t_f, v_i"));
     assert!(complaint(&["step_response", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
 }
 

@@ -33,6 +33,10 @@ fn amplified((slider, velocities, t_f): (SpringBlock, (f64, f64), f64), rtol: f6
     amplification(&slider, velocities, t_f, rtol)
 }
 
+fn held((slider, velocities, t_f): (SpringBlock, (f64, f64), f64), dt: f64, rtol: f64) -> OpenLoopResult {
+    held_error(&slider, velocities, t_f, dt, rtol)
+}
+
 #[test]
 fn reference_every_number_is_good_to_rtol() {
     let rows = reference::table("compliant");
@@ -74,9 +78,7 @@ fn paper_shortcut_stays_below_4_31e6_and_its_control_goes_negative() {
 
 #[test]
 fn paper_larger_steps_of_the_control_leave_visible_oscillations() {
-    let path = path(PAPER);
-    let errors =
-        [100.0, 30.0, 10.0, 4.0, 2.0].map(|n| held_error(&path, PAPER.2 / n, 1e-8).number.expect("is simulated"));
+    let errors = [100.0, 30.0, 10.0, 4.0, 2.0].map(|n| held(PAPER, PAPER.2 / n, 1e-8).number.expect("is simulated"));
     assert!(errors.windows(2).all(|pair| pair[1] > 4.0 * pair[0]), "{errors:?}");
     assert!(errors[0] < 2e-3 && errors[2] > 0.1, "{errors:?}");
 }
@@ -209,7 +211,7 @@ fn reference_a_held_control_misses_by_what_a_library_finds() {
         }
         let expected = scaled(&case.0, state - steady(&case.0, case.1.1)).iter().map(|x| x * x).sum::<f64>().sqrt();
         for rtol in [1e-4, 1e-6, 1e-8, 1e-10] {
-            let found = held_error(&path, dt, rtol).number.expect("is simulated");
+            let found = held(case, dt, rtol).number.expect("is simulated");
             assert!((found - expected).abs() <= rtol, "{found} {expected} at {rtol}");
         }
     }
@@ -221,8 +223,7 @@ fn the_error_of_a_held_control_is_of_second_order() {
     let light = (SpringBlock { m: 0.0, ..SLOW.0 }, SLOW.1, SLOW.2);
     // A rigid spring forgives the third order later.
     for (case, n) in [(PAPER, 800.0), (SLOW, 800.0), (light, 800.0), (rigid, 6400.0)] {
-        let path = path(case);
-        let errors = [n, 2.0 * n, 4.0 * n].map(|n| held_error(&path, case.2 / n, 1e-11).number.expect("is simulated"));
+        let errors = [n, 2.0 * n, 4.0 * n].map(|n| held(case, case.2 / n, 1e-11).number.expect("is simulated"));
         for pair in errors.windows(2) {
             let order = (pair[0] / pair[1]).log2();
             assert!((order - 2.0).abs() < 0.05, "{case:?}: {errors:?}");
@@ -358,7 +359,7 @@ fn regress_work_counts() {
     let solved = compliant::solve(&PAPER.0, PAPER.1, PAPER.2, 1e-10);
     assert_eq!((solved.stats.quadratures, solved.stats.nodes), (7, 480));
     let path = path(PAPER);
-    let followed = [amplified(PAPER, 1e-10), open_loop_error(&path, 1e-10), held_error(&path, PAPER.2 / 100.0, 1e-10)];
+    let followed = [amplified(PAPER, 1e-10), open_loop_error(&path, 1e-10), held(PAPER, PAPER.2 / 100.0, 1e-10)];
     let [grown, reported, held] = followed.map(|followed| followed.steps);
     // At least a step a sample.
     assert!(grown == 39 && reported < 100 && (100..400).contains(&held), "{grown} {reported} {held}");

@@ -77,7 +77,8 @@ pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) 
     if let Some(y) = y.filter(|y| !filtered.words(y).is_empty()) {
         return Err(PlotError::Words { column: y.to_owned() });
     }
-    let preferred = || choice.find(defaults.x, colour, 3).or_else(|| choice.longest());
+    let preferred = || choice.find(defaults.x, colour, defaults.least_map.min(MANY_VALUES));
+    let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 3)).or_else(|| choice.longest());
     let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 2));
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
@@ -85,6 +86,9 @@ pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) 
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
     Ok(Shape::Lines(lines::LineColumns { x, y, series }))
 }
+
+/// Number of values of an axis that is preferred for lines. Chosen: enough for a curve.
+const MANY_VALUES: usize = 12;
 
 /// The inputs of a choice.
 struct Choice<'a> {

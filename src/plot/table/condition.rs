@@ -44,7 +44,32 @@ impl Condition {
     ///
     /// A condition without a column, a comparison and a value.
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
-        text.split(',').flat_map(|part| part.split(" and ")).map(Condition::one).collect()
+        let (mut all, mut from, mut quote) = (Vec::new(), 0, None);
+        for (place, letter) in text.char_indices() {
+            // A separator in quotes belongs to a word.
+            let separator = match (letter, quote) {
+                ('"' | '\'', None) if text[..place].trim_end().ends_with(['=', '<', '>']) => {
+                    quote = Some(letter);
+                    continue;
+                }
+                (_, Some(opening)) => {
+                    quote = quote.filter(|_| letter != opening);
+                    continue;
+                }
+                (',', _) => ",",
+                (' ', _) if text[place..].starts_with(" and ") => " and ",
+                _ => continue,
+            };
+            if place >= from {
+                all.push(Condition::one(&text[from..place])?);
+                from = place + separator.len();
+            }
+        }
+        if quote.is_some() {
+            return Err(PlotError::Condition { text: text.trim().to_owned() });
+        }
+        all.push(Condition::one(&text[from..])?);
+        Ok(all)
     }
 
     fn one(text: &str) -> Result<Condition, PlotError> {
@@ -177,11 +202,15 @@ mod tests {
             let conditions = Condition::all(text).expect("a condition");
             assert!(conditions[0].holds_word(Some("ok")) && !conditions[0].holds_word(Some("infeasible")), "{text}");
         }
+        for text in ["material='gabbro, wet', b=0.04", "b=0.04 and material = \"gabbro, wet\""] {
+            let conditions = Condition::all(text).expect("two conditions");
+            assert!(conditions.len() == 2 && conditions.iter().any(|c| c.holds_word(Some("gabbro, wet"))), "{text}");
+        }
     }
 
     #[test]
     fn what_is_no_condition_is_refused() {
-        for text in ["a", "=3", "a=", "a=1,", ""] {
+        for text in ["a", "=3", "a=", "a=1,", "", "material='gabbro, wet"] {
             assert!(matches!(Condition::all(text), Err(PlotError::Condition { .. })), "{text}");
         }
     }

@@ -72,8 +72,8 @@ struct Border {
 fn bound(scene: &TableScene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Border> {
     let value = |name| scene.scaled(groups, panel, name);
     let (t_f, start, end) = (value("t_f")?, 1.0 / value("v_i")?, 1.0 / value("v_f")?);
-    // Coefficients in units of 1/t_f and 1/t_f^2 do not depend on `t_f`.
-    let unit = |alpha: &str, power: f64| if scene.filtered.unit(alpha).starts_with("1/t_f") { 1.0 } else { power };
+    // Coefficients relative to `t_f` do not depend on it.
+    let unit = |alpha: &str, power: f64| if scene.filtered.unit(alpha).contains("t_f") { 1.0 } else { power };
     let rate = scene.source.units.size("v_0/l");
     let (unit_2, unit_3) = (unit(ALPHAS[0], t_f), unit(ALPHAS[1], t_f * t_f / rate));
     let at = |cells: &AxisCells, step: usize| cells.scale.value(step as f64 / STEPS as f64);

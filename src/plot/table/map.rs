@@ -107,7 +107,10 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
     }
     figure.legend = shading.legend(&sheets, raster.are_dots);
     figure.colours = shading.colours;
-    figure.notes.extend(along.into_iter().chain(no_value).chain(raster.note(plan)));
+    let unbounded = |name: &&String| filtered.axis(name).is_some_and(|axis| axis.infinite);
+    let unbounded = [&plan.x, &plan.y].into_iter().find(unbounded);
+    let unbounded = unbounded.map(|name| format!("Rows with {} = ∞ have no place in the map.", label::name(name)));
+    figure.notes.extend(along.into_iter().chain(no_value).chain(unbounded).chain(raster.note(plan)));
     let least = sheets.iter().map(|sheet| sheet.least).collect();
     Ok(MapFigure { figure, groups, least, cells: raster.cells })
 }
