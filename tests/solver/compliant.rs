@@ -361,8 +361,8 @@ fn regress_work_counts() {
     let path = path(PAPER);
     let followed = [amplified(PAPER, 1e-10), open_loop_error(&path, 1e-10), held(PAPER, PAPER.2 / 100.0, 1e-10)];
     let [grown, reported, held] = followed.map(|followed| followed.steps);
-    // At least a step a sample.
-    assert!(grown == 39 && reported < 100 && (100..400).contains(&held), "{grown} {reported} {held}");
+    // At least a step a sample in each of two simulations.
+    assert!(grown == 39 && reported < 100 && (200..600).contains(&held), "{grown} {reported} {held}");
 }
 
 /// Squares of a large flow overflowed, and the amplification came out as 0. The logarithms are from an integration of the
