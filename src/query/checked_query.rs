@@ -186,7 +186,7 @@ impl Visit for Check<'_> {
         let windows = || select.projection.iter().filter_map(expression).chain(&select.qualify).find_map(first_window);
         if let Some(window) = Some(()).filter(|()| is_grouped).and_then(|()| windows()) {
             return self.refuse(InvalidQuery::new(
-                format!("`{window}`: OVER beside GROUP BY"),
+                format!("`{window}`: OVER and GROUP BY in one SELECT"),
                 "group in a subquery: SELECT ... OVER (...) FROM (SELECT ... GROUP BY ...) AS t",
             ));
         }
@@ -423,7 +423,7 @@ fn meaning<'a>(name: &Expr, projection: &'a [SelectItem]) -> Option<&'a Expr> {
 }
 
 /// The visitor that writes HAVING in aggregates of the columns of the table: polars does not know the keys of the groups there, nor other names
-/// beside aggregates.
+/// next to aggregates.
 struct HavingTerms<'a> {
     keys: &'a Keys,
     projection: &'a [SelectItem],

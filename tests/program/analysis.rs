@@ -374,7 +374,7 @@ fn regress_answers_are_those_of_standard_sql() {
         ),
         (
             "SELECT t_f, count(*) OVER (PARTITION BY v_f) AS x FROM optimal GROUP BY t_f, v_f",
-            "`count(*) OVER (PARTITION BY v_f)`: OVER beside GROUP BY",
+            "`count(*) OVER (PARTITION BY v_f)`: OVER and GROUP BY in one SELECT",
         ),
         (
             "SELECT b.t_f FROM best_cubic b SEMI JOIN optimal o ON b.t_f = o.t_f",
