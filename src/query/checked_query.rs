@@ -423,7 +423,7 @@ fn meaning<'a>(name: &Expr, projection: &'a [SelectItem]) -> Option<&'a Expr> {
 }
 
 /// The visitor that writes HAVING in aggregates of the columns of the table: polars does not know the keys of the groups there, nor other names
-/// next to aggregates.
+/// together with aggregates.
 struct HavingTerms<'a> {
     keys: &'a Keys,
     projection: &'a [SelectItem],
