@@ -203,6 +203,7 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     let help = match error.kind() {
         io::ErrorKind::NotFound => "make its folder first, or name an existing one",
         io::ErrorKind::StorageFull => "free some space, or write to another disk",
+        io::ErrorKind::FileTooLarge => "raise the limit of file sizes, `ulimit -f`, or write fewer rows",
         _ => "choose an existing folder with write permission",
     };
     Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))

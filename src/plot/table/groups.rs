@@ -202,18 +202,21 @@ impl Groups {
         Groups { axes, shown, all, left_out, makes, crossed: None, held: Vec::new(), places }
     }
 
-    /// Names the groups by their labels, if each has a unique label.
+    /// Names the groups by their labels, if each has a unique label, in the order of their first rows: that of the file of points.
     fn label(&mut self, filtered: &FilteredTable) -> Result<(), PlotError> {
         if filtered.labels.is_empty() || self.shown.len() < 2 {
             return Ok(());
         }
         let columns: Vec<&str> = self.axes.iter().map(String::as_str).chain(filtered.label_columns()).collect();
         let mut labels = vec![String::new(); self.shown.len()];
-        let mut is_one = true;
+        let (mut is_one, mut order) = (true, Vec::new());
         filtered.each_while(&columns, |row| {
             let (group, cells) = row.split_at(self.axes.len());
             if let Some(place) = self.place(group) {
                 let label = filtered.label(cells);
+                if labels[place].is_empty() {
+                    order.push(place);
+                }
                 is_one = !label.is_empty() && (labels[place].is_empty() || labels[place] == label);
                 labels[place] = label;
             }
@@ -221,7 +224,10 @@ impl Groups {
         })?;
         let different: HashSet<&String> = labels.iter().filter(|label| !label.is_empty()).collect();
         if is_one && different.len() == self.shown.len() {
-            self.shown.iter_mut().zip(labels).for_each(|(group, label)| group.name = label);
+            let group =
+                |&place: &usize| Group { name: labels[place].clone(), values: self.shown[place].values.clone() };
+            self.shown = order.iter().map(group).collect();
+            self.places = places_of(&self.shown);
         }
         Ok(())
     }
@@ -367,29 +373,34 @@ fn varying(found: &[Vec<f64>]) -> Vec<usize> {
     (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
 }
 
-/// The indices of the shown groups, at most `most`: first merged lines, then sets of groups that differ in one axis alone, `series` or the last one,
-/// and so are comparable.
+/// The indices of the shown groups, at most `most`: merged lines with some of the others at the first values of further axes, or sets of groups that
+/// differ in one axis alone, `series` or the last one, and so are comparable.
 fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usize>) -> Vec<usize> {
-    let is_kept = |place: &usize| makes == GroupRole::Lines && found[*place].iter().any(|value| value.is_nan());
-    let (mut places, others): (Vec<usize>, Vec<usize>) = (0..found.len()).partition(is_kept);
-    places.truncate(most);
-    if !places.is_empty() {
+    let varying = varying(found);
+    let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
+    let is_merged = |group: &Vec<f64>| makes == GroupRole::Lines && group.iter().any(|value| value.is_nan());
+    if found.iter().any(is_merged) {
+        let is_further = |axis: &&usize| Some(**axis) != fast && !found.iter().any(|group| group[**axis].is_nan());
+        let further: Vec<usize> = varying.iter().filter(is_further).copied().collect();
+        let is_first = |place: &usize| further.iter().all(|&axis| found[*place][axis] == found[0][axis]);
+        let (mut places, others): (Vec<usize>, Vec<usize>) =
+            (0..found.len()).filter(is_first).partition(|&place| is_merged(&found[place]));
+        places.truncate(most);
         places.extend(chosen(others.len(), most - places.len()).into_iter().map(|place| others[place]));
         places.sort_unstable();
         return places;
     }
-    let varying = varying(found);
-    let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
     let rest = |place: usize| -> Vec<u64> {
         let axes = (0..found[place].len()).filter(|axis| Some(*axis) != fast);
         axes.map(|axis| found[place][axis].to_bits()).collect()
     };
     let mut sets: IndexMap<Vec<u64>, Vec<usize>> = IndexMap::new();
-    others.iter().for_each(|&place| sets.entry(rest(place)).or_default().push(place));
+    (0..found.len()).for_each(|place| sets.entry(rest(place)).or_default().push(place));
     if sets.values().all(|set| set.len() == 1) {
         // Axes that advance together.
-        sets = IndexMap::from([(Vec::new(), others)]);
+        sets = IndexMap::from([(Vec::new(), (0..found.len()).collect())]);
     }
+    let mut places = Vec::new();
     for set in sets.into_values() {
         let room = most - places.len();
         if !places.is_empty() && set.len() > room {
@@ -431,6 +442,21 @@ mod tests {
         let blocks =
             Gridded::of("[[block]]\n[block.axes]\nt_f = [1.0, 2.0]\n[[block]]\n[block.axes]\nb = [1.0, 2.0]\n");
         assert!(blocks.is_free("t_f", &["b"]) && blocks.is_free("b", &["t_f"]));
+    }
+
+    /// Family, final velocity and friction ceiling, which two families do not have.
+    #[test]
+    fn lines_of_families_are_at_the_first_velocity() {
+        let mut found = Vec::new();
+        for family in [0.0, 1.0] {
+            found.extend([10.0, 20.0, 30.0].map(|v_f| vec![family, v_f, f64::NAN]));
+        }
+        let friction = [10.0, 20.0, 30.0].map(|v_f| [1.1, 1.2].map(|tau| vec![3.0, v_f, tau]));
+        found.extend(friction.into_iter().flatten());
+        let shown: Vec<&Vec<f64>> =
+            choice(&found, 7, GroupRole::Lines, Some(0)).into_iter().map(|place| &found[place]).collect();
+        assert!(shown.len() == 4 && shown.iter().all(|group| group[1] == 10.0), "{shown:?}");
+        assert_eq!(shown.iter().filter(|group| group[0] == 3.0).count(), 2);
     }
 
     #[test]
