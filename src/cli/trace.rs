@@ -703,6 +703,7 @@ fn the_row(
                 let Some(wanted) = condition.wanted() else { continue };
                 for row in 0..frame.height {
                     if let Some((_, Cell::Number(value))) = frame.row(row).get(place)
+                        && !condition.holds(nearest[place])
                         && !((value - wanted).abs() >= (nearest[place] - wanted).abs())
                     {
                         nearest[place] = *value;

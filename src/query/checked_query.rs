@@ -183,8 +183,8 @@ impl Visit for Check<'_> {
             ));
         }
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
-        let windows = || select.projection.iter().filter_map(expression).chain(&select.qualify).find_map(first_window);
-        if let Some(window) = Some(()).filter(|()| is_grouped).and_then(|()| windows()) {
+        let mut items = select.projection.iter().filter_map(expression).chain(&select.qualify);
+        if is_grouped && let Some(window) = items.find_map(first_window) {
             return self.refuse(InvalidQuery::new(
                 format!("`{window}`: OVER and GROUP BY in one SELECT"),
                 "group in a subquery: SELECT ... OVER (...) FROM (SELECT ... GROUP BY ...) AS t",
