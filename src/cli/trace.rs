@@ -702,11 +702,10 @@ fn the_row(
             for (place, condition) in all.iter().enumerate() {
                 let Some(wanted) = condition.wanted() else { continue };
                 for row in 0..frame.height {
-                    if let Some((_, Cell::Number(value))) = frame.row(row).get(place)
-                        && !condition.holds(nearest[place])
-                        && !((value - wanted).abs() >= (nearest[place] - wanted).abs())
-                    {
-                        nearest[place] = *value;
+                    let Some((_, Cell::Number(value))) = frame.row(row).get(place).cloned() else { continue };
+                    let is_nearer = (value - wanted).abs() < (nearest[place] - wanted).abs();
+                    if !condition.holds(nearest[place]) && (is_nearer || nearest[place].is_nan()) {
+                        nearest[place] = value;
                     }
                 }
             }

@@ -153,6 +153,7 @@ impl Tables {
         // Names of types and of nodes of the syntax tree of polars mean nothing to a user.
         let is_internal = line.contains("Query {")
             || line.starts_with("join type")
+            || line.contains("activate '")
             || line.contains(" { ") && line.contains("expression");
         if is_internal {
             let found =
@@ -164,6 +165,9 @@ impl Tables {
             let name = line.split('\'').nth(1).unwrap_or_default();
             let found = format!("`{name}` is neither in GROUP BY nor in an aggregate");
             (found, format!("add it to GROUP BY, or write min({name}) or max({name})"))
+        } else if known("duplicate output name") {
+            let help = "name them in a subquery: FROM (SELECT upper(x) AS a, length(x) AS b FROM t) AS s GROUP BY a, b";
+            ("two keys of GROUP BY are functions of one column".to_owned(), help.to_owned())
         } else if known("LIMIT/OFFSET") {
             ("LIMIT and OFFSET take whole numbers from 0".to_owned(), "correct the number".to_owned())
         } else if known("dtype") || known("cannot compare") || known("cannot cast") {

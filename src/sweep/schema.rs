@@ -220,7 +220,7 @@ fn form(quantity: Quantity, units: &Units) -> Value {
     below.insert("exclusiveMaximum".to_owned(), json!(0.0));
     let (least, _) = quantity.domain().least();
     let sides = if least < 0.0 { vec![range(&above), range(&below)] } else { vec![range(&above)] };
-    let names: Vec<&str> = quantity.scales().iter().map(|scale| unit_name(&units, quantity, *scale)).collect();
+    let names: Vec<&str> = quantity.scales().iter().map(|scale| unit_name(units, quantity, *scale)).collect();
     let spaced = |how: &str| format!("[first, last, count], evenly spaced{how}, both ends included");
     let expression = "Computed from other axes at every point, such as 10 * v_i";
     let forms = ["linspace", "geomspace", "expr", "sobol", "lhs"];
