@@ -192,7 +192,7 @@ def test_traces_from_a_state_and_after_a_disturbance():
     [
         (lambda: ss.trace("optimum", **PAPER), 'unknown protocol "optimum"\n  expected: optimal, best_cubic'),
         (lambda: ss.trace("optimal", **PAPER | dict(t_f=[0.02, 0.03])), "t_f: found list\n  expected: a number"),
-        (lambda: ss.trace("optimal", **PAPER, points=1), "invalid value '1' for '--points <N>': 1 is not in 2..=10000000"),
+        (lambda: ss.trace("optimal", **PAPER, points=1), "invalid value '1' for '--points <N>': expected a whole number from 2 to 10000000"),
         (lambda: ss.run({"name": "x", "axes": PAPER, "tables": {"optimal": {}}}, threads=0), "threads: 0 is out of range"),
         (lambda: ss.run({"name": "x", "axes": PAPER, "tables": {"optimal": {}}}, threads=1025), "threads: 1025 is out of range"),
     ],

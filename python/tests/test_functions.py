@@ -193,7 +193,7 @@ def test_si_units():
     si = ss.optimal(t_f=0.02 * 10.0, a=0.03 * 0.6, b=0.05 * 0.6, v_i=3e-6, v_f=1e-4, units="si", **scales)
     assert si.units["work"] == "J/m^2" and si.units["t_f"] == "s"
     assert si["work"] == pytest.approx(scaled["work"] * 0.6 * 5e6 * 1e-5, rel=1e-9)
-    with pytest.warns(UserWarning, match="unphysically fast"):
+    with pytest.warns(UserWarning, match="unusually fast"):
         ss.optimal(t_f=0.2, a=0.018, b=0.03, v_i=3e-5, v_f=2e6, units="si", **scales | dict(v_0=1e-5))
 
 
