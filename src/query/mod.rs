@@ -165,7 +165,7 @@ impl Tables {
             let name = line.split('\'').nth(1).unwrap_or_default();
             let found = format!("`{name}` is neither in GROUP BY nor in an aggregate");
             (found, format!("add it to GROUP BY, or write min({name}) or max({name})"))
-        } else if known("duplicate output name") {
+        } else if known("group_by keys contained duplicate") {
             let help = "name them in a subquery: FROM (SELECT upper(x) AS a, length(x) AS b FROM t) AS s GROUP BY a, b";
             ("two keys of GROUP BY are functions of one column".to_owned(), help.to_owned())
         } else if known("LIMIT/OFFSET") {

@@ -27,9 +27,10 @@ fn of_body(body: &SetExpr, tables: &HashMap<String, Columns>) -> Columns {
         SetExpr::Select(select) => of_select(select, tables),
         SetExpr::Query(query) => units(query, tables),
         SetExpr::SetOperation { left, right, .. } => {
+            let is_ordered = is_ordered(left) && is_ordered(right);
             let (mut left, right) = (of_body(left, tables), of_body(right, tables));
             for (place, (_, unit)) in left.iter_mut().enumerate() {
-                if right.get(place).is_none_or(|(_, other)| other != unit) {
+                if !is_ordered || right.get(place).is_none_or(|(_, other)| other != unit) {
                     unit.clear();
                 }
             }
@@ -39,34 +40,47 @@ fn of_body(body: &SetExpr, tables: &HashMap<String, Columns>) -> Columns {
     }
 }
 
+/// Whether the columns of a query are known in their order: names, expressions and a plain `*` of one table.
+fn is_ordered(body: &SetExpr) -> bool {
+    let is_plain = |select: &Select, item: &SelectItem| match item {
+        SelectItem::UnnamedExpr(Expr::Function(function)) => !is_one_of("columns", function),
+        SelectItem::Wildcard(options) | SelectItem::QualifiedWildcard(_, options) => {
+            let is_one_table = matches!(select.from.as_slice(), [from] if from.joins.is_empty());
+            is_one_table && *options == WildcardAdditionalOptions::default()
+        }
+        _ => true,
+    };
+    match body {
+        SetExpr::Select(select) => select.projection.iter().all(|item| is_plain(select, item)),
+        SetExpr::Query(query) => is_ordered(&query.body),
+        SetExpr::SetOperation { left, right, .. } => is_ordered(left) && is_ordered(right),
+        _ => false,
+    }
+}
+
 fn of_select(select: &Select, tables: &HashMap<String, Columns>) -> Columns {
     let mut scope = Scope::default();
     select.from.iter().for_each(|from| scope.read(from, tables));
-    let mut found = Vec::new();
-    let mut all = |table: Option<&str>, options: Option<&WildcardAdditionalOptions>| {
-        let mut columns = scope.columns(table);
-        // A replaced column has another meaning.
-        let replaced = options.and_then(|options| options.opt_replace.as_ref()).into_iter();
-        for item in replaced.flat_map(|replace| &replace.items) {
+    let all = |table: Option<&str>, options: &WildcardAdditionalOptions| {
+        // A column with a new name or a new meaning may have the name of another.
+        let is_changed = options.opt_rename.is_some();
+        let mut columns = if is_changed { Vec::new() } else { scope.columns(table) };
+        for item in options.opt_replace.iter().flat_map(|replace| &replace.items) {
             columns.retain(|(name, _)| *name != item.column_name.value);
         }
-        found.append(&mut columns);
+        columns
     };
-    let mut own = Vec::new();
-    for item in &select.projection {
-        match item {
-            SelectItem::UnnamedExpr(Expr::Function(function)) if is_one_of("columns", function) => all(None, None),
-            SelectItem::UnnamedExpr(expression) => own.push((name(expression), scope.unit(expression))),
-            SelectItem::ExprWithAlias { expr, alias } => own.push((alias.value.clone(), scope.unit(expr))),
-            SelectItem::QualifiedWildcard(SelectItemQualifiedWildcardKind::ObjectName(table), options) => {
-                all(Some(table.to_string().as_str()), Some(options));
-            }
-            SelectItem::Wildcard(options) => all(None, Some(options)),
-            _ => {}
+    let of_item = |item: &SelectItem| match item {
+        SelectItem::UnnamedExpr(Expr::Function(function)) if is_one_of("columns", function) => scope.columns(None),
+        SelectItem::UnnamedExpr(expression) => vec![(name(expression), scope.unit(expression))],
+        SelectItem::ExprWithAlias { expr, alias } => vec![(alias.value.clone(), scope.unit(expr))],
+        SelectItem::QualifiedWildcard(SelectItemQualifiedWildcardKind::ObjectName(table), options) => {
+            all(Some(table.to_string().as_str()), options)
         }
-    }
-    own.append(&mut found);
-    own
+        SelectItem::Wildcard(options) => all(None, options),
+        _ => Vec::new(),
+    };
+    select.projection.iter().flat_map(of_item).collect()
 }
 
 /// The tables in FROM.

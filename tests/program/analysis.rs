@@ -377,6 +377,10 @@ fn regress_answers_are_those_of_standard_sql() {
             "`count(*) OVER (PARTITION BY v_f)`: OVER and GROUP BY in one SELECT",
         ),
         (
+            "SELECT upper(status), length(status), count(*) FROM optimal GROUP BY upper(status), length(status)",
+            "two keys of GROUP BY are functions of one column",
+        ),
+        (
             "SELECT b.t_f FROM best_cubic b SEMI JOIN optimal o ON b.t_f = o.t_f",
             "a part of the query is not supported, such as EXISTS, SEMI JOIN or a subquery in an expression",
         ),
@@ -397,6 +401,31 @@ fn regress_answers_are_those_of_standard_sql() {
     assert_eq!(json, "{\"v_f\":100.0,\"all_of\":[0.02,0.037,0.049]}\n");
     let infinite = "SELECT 1.0 / (t_f - t_f) AS x FROM best_cubic LIMIT 1";
     assert_eq!(printed(folder.path(), &["query", "results/test", infinite, "--format", "jsonl"]), "{\"x\":\"inf\"}\n");
+}
+
+#[test]
+fn rows_without_numbers_lead_to_rows_with_numbers() {
+    let folder = landscape();
+    let head = printed(folder.path(), &["head", "results/test", "gap", "-n", "3"]);
+    let (_, query) = head.split_once("  the first rows with numbers: slipsweep query results/test \"").expect("a hint");
+    let answer = printed(folder.path(), &["query", "results/test", query.trim_end().trim_end_matches('"')]);
+    assert_eq!((answer.lines().count(), answer.matches(" ok").count()), (5, 3), "{answer}");
+    assert!(!printed(folder.path(), &["head", "results/test", "optimal"]).contains("the first rows with numbers"));
+}
+
+/// The best cubic of the paper peaks above 300.
+#[test]
+fn a_gap_below_zero_is_explained() {
+    for (ceiling, is_explained) in [("300.0", true), ("inf", false)] {
+        let axes = format!("t_f = 0.02\n{MATERIAL}v_ceiling = {ceiling}\n");
+        let folder = dataset(&axes, "[tables.best_cubic]\n");
+        let summary = printed(folder.path(), &["summary", "results/test"]);
+        assert_eq!(
+            summary.contains("a negative gap: the shortcut is faster than v_ceiling"),
+            is_explained,
+            "{summary}"
+        );
+    }
 }
 
 #[test]
@@ -450,6 +479,8 @@ fn regress_units_of_subqueries() {
         ("SELECT v_f, t_f FROM optimal UNION ALL SELECT v_i, work FROM optimal", "v_0"),
         ("SELECT b.*, o.work AS least FROM best_cubic b JOIN optimal o ON b.t_f = o.t_f", "l/v_0 mu_0 mu_0 v_0 v_0"),
         ("SELECT * REPLACE (t_f * 2 AS t_f) FROM optimal", "mu_0 mu_0 v_0 v_0 v_0"),
+        ("SELECT * FROM optimal UNION ALL SELECT * FROM optimal", "l/v_0 mu_0 mu_0 v_0 v_0"),
+        ("SELECT t_f, COLUMNS('v_[if]') FROM optimal UNION ALL SELECT t_f, v_f, work FROM optimal", "0.02 3 100"),
     ] {
         let answer = printed(folder.path(), &["query", "results/test", question]);
         let line = answer.lines().nth(1).unwrap_or_default();
