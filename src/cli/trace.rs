@@ -677,8 +677,6 @@ fn the_row(
     }
     let names: Vec<&str> = all.iter().map(|condition| condition.column.as_str()).collect();
     let mut found = Vec::new();
-    // The value of the table that is nearest to each wanted number.
-    let mut nearest = vec![f64::NAN; all.len()];
     for part in folder.parts_there(table) {
         let file = folder.part(&table.name, part);
         if part == 0 || found.is_empty() {
@@ -698,18 +696,6 @@ fn the_row(
                 Cell::Missing => false,
             })
         };
-        if found.is_empty() {
-            for (place, condition) in all.iter().enumerate() {
-                let Some(wanted) = condition.wanted() else { continue };
-                for row in 0..frame.height {
-                    let Some((_, Cell::Number(value))) = frame.row(row).get(place).cloned() else { continue };
-                    let is_nearer = (value - wanted).abs() < (nearest[place] - wanted).abs();
-                    if !condition.holds(nearest[place]) && (is_nearer || nearest[place].is_nan()) {
-                        nearest[place] = value;
-                    }
-                }
-            }
-        }
         found.extend((0..frame.height).filter(meets).take(MAX_NAMED_ROWS + 1).map(|place| first + place as u64));
         if found.len() > MAX_NAMED_ROWS {
             break;
@@ -719,13 +705,7 @@ fn the_row(
     match found.as_slice() {
         [row] => Ok(*row),
         [] => {
-            let missed = all.iter().zip(&nearest).filter(|(condition, nearest)| !condition.holds(**nearest));
-            let missed: Vec<String> = missed
-                .filter(|(_, nearest)| nearest.is_finite())
-                .map(|(condition, nearest)| format!("{} = {nearest:?}", condition.column))
-                .collect();
-            let nearest =
-                if missed.is_empty() { String::new() } else { format!("\n  found: nearest {}", missed.join(", ")) };
+            let nearest = nearest(folder, table, &all)?;
             let found = format!("{at}: no row of `{name}` meets --where {conditions:?}{nearest}");
             Err(wrong(format!("{found}\n  help: slipsweep head {at} {name}")))
         }
@@ -734,16 +714,47 @@ fn the_row(
             let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
             let what = format!("{at}: several rows of `{name}` meet --where {conditions:?}");
             let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
-            let rows = several.iter().map(|row| Ok(row_at(path, folder, manifest, table, *row)?.1));
-            let rows: Vec<Row> = rows.collect::<Result<_, Failure>>()?;
-            let varies = |place: usize| rows.iter().any(|row| row.get(place) != rows[0].get(place));
-            let names =
-                rows[0].iter().enumerate().filter(|(place, _)| varies(*place)).map(|(_, (name, _))| name.as_str());
-            let axes: Vec<&str> = names.filter(|name| Quantity::from_name(name).is_some()).collect();
+            let axes = differing_axes(path, folder, (manifest, table), several)?;
             let more = if axes.is_empty() { String::new() } else { format!(", or a condition on {}", axes.join(", ")) };
             Err(refused(found, "one row", format!("--row {}{more}", several[0])))
         }
     }
+}
+
+/// The values of the table that are nearest to the wanted numbers that it does not have, as a line of a message.
+fn nearest(folder: &Folder, table: &ManifestTable, conditions: &[Condition]) -> Result<String, Failure> {
+    let mut missed = Vec::new();
+    for condition in conditions {
+        let Some(wanted) = condition.wanted() else { continue };
+        let mut best: Option<f64> = None;
+        for part in folder.parts_there(table) {
+            let frame = frame::read(&folder.part(&table.name, part), &[&condition.column]).map_err(Failure::failed)?;
+            let numbers = (0..frame.height).filter_map(|row| match frame.row(row).first() {
+                Some((_, Cell::Number(value))) => Some(*value),
+                _ => None,
+            });
+            let off = |value: &f64| if condition.holds(*value) { 0.0 } else { (value - wanted).abs() };
+            best = numbers.chain(best).min_by(|one, other| off(one).total_cmp(&off(other)));
+        }
+        if let Some(best) = best.filter(|best| !condition.holds(*best)) {
+            missed.push(format!("{} = {best:?}", condition.column));
+        }
+    }
+    Ok(if missed.is_empty() { String::new() } else { format!("\n  found: nearest {}", missed.join(", ")) })
+}
+
+/// The axes in which rows differ.
+fn differing_axes(
+    path: &Path,
+    folder: &Folder,
+    (manifest, table): (&Manifest, &ManifestTable),
+    numbers: &[u64],
+) -> Result<Vec<String>, Failure> {
+    let rows = numbers.iter().map(|row| Ok(row_at(path, folder, manifest, table, *row)?.1));
+    let rows: Vec<Row> = rows.collect::<Result<_, Failure>>()?;
+    let varies = |place: usize| rows.iter().any(|row| row.get(place) != rows[0].get(place));
+    let names = rows[0].iter().enumerate().filter(|(place, _)| varies(*place)).map(|(_, (name, _))| name);
+    Ok(names.filter(|name| Quantity::from_name(name).is_some()).cloned().collect())
 }
 
 /// What a disturbance does to a protocol: the work beyond the planned one and the terminal error, by loop.
