@@ -101,14 +101,17 @@ fn held_distance(
 /// Accuracy of the shortcut, in units of `rtol`. Chosen: its acceleration, which the control contains, has two digits less than its velocity.
 const PATH_ACCURACY: f64 = 0.01;
 
-/// Tolerance of the second simulation, relative to the first, and parts of a sampling interval. Chosen: its error is that of the first to a digit,
-/// also where one step of the first crosses a fast relaxation.
+/// Tolerance of the second simulation, relative to the first. Chosen: its error is that of the first to a digit.
 const FINER: f64 = 0.1;
+
+/// Parts of a sampling interval in the second simulation. Chosen: it resolves a relaxation that one step of the first crosses.
 const PARTS: f64 = 8.0;
 
-/// Relative shift of the control velocity in the first simulation: in units of `rtol`, and at least. Chosen: small enough for a control that is
-/// the difference of large terms, and a few roundings.
+/// Relative shift of the control velocity in the first simulation, in units of `rtol`. Chosen: four digits are left for a control that is the
+/// difference of large terms.
 const SHIFT: f64 = 1e-4;
+
+/// Least relative shift. Derived: some units in the last place, so that it is not lost in rounding.
 const MIN_SHIFT: f64 = 1e-15;
 
 /// First step, in units of `t_f`. Chosen: step-size control shortens it.

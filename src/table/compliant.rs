@@ -39,7 +39,7 @@ fields! { Row:
         => |row| number(row.amplification);
     sampling_error "1"
         "distance from the final steady state in that norm if v_c is sampled every dt and held; error up to rtol (1 + sampling_error); \
-         null for dt = 0, beyond 100000 samples, if the simulation does not reach t_f, and where two differ by more"
+         null for dt = 0, beyond 100000 samples, if the simulation does not reach t_f, and where two simulations differ by more"
         => |row| number(row.sampling_error);
     stiffness_ratio "1" "k t_f^2/m: the spring is nearly rigid if this is large; inf for m = 0"
         => |row| if row.slider.m > 0.0 { row.slider.k * row.t_f * row.t_f / row.slider.m } else { f64::INFINITY };

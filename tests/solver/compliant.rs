@@ -217,6 +217,37 @@ fn reference_a_held_control_misses_by_what_a_library_finds() {
     }
 }
 
+/// An unstable motion that steps follow by symmetry, one that grows from rounding, and a relaxation within one step.
+#[test]
+fn regress_sampling_errors_are_confirmed_at_every_rtol() {
+    let block = |a, b, k, m| SpringBlock { law: Law { a, b }, k, m };
+    let growing = (
+        block(0.009726472942776397, 0.019756482060041557, 1.9564830019060147e-5, 1.8698073792463112e-15),
+        (1694.414030518873, 1673.5407267384317),
+        2572.504292784483,
+    );
+    let rounding = (
+        block(0.0014259086007340333, 0.00010463874126539788, 5.2686872107475295, 0.1114746559165563),
+        (2.4801821635137093, 2.4802022796548004),
+        4989.594452405204,
+    );
+    let relaxing = (
+        block(0.29741210813052255, 0.22698566715183058, 0.03195997618147473, 0.0),
+        (1.0012222492696503, 1.0012193258920763),
+        500.6923492821583,
+    );
+    let exact = held(relaxing, 226.89267334993363, 1e-10).number.expect("is confirmed");
+    for rtol in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8] {
+        let relaxed = held(relaxing, 226.89267334993363, rtol).number;
+        assert!(relaxed.is_none_or(|found| (found - exact).abs() <= rtol), "{relaxed:?} {exact} at {rtol}");
+        // The exact motion arrives; its computed errors grow by more than any accuracy.
+        assert_eq!(held(growing, 47.089729322708926, rtol).number, None, "at {rtol}");
+        let rounded = held(rounding, 163.5932956432249, rtol).number;
+        assert!(rounded.is_none_or(|found| found <= rtol), "{rounded:?} at {rtol}");
+    }
+    assert!(held(relaxing, 226.89267334993363, 1e-4).number.is_some());
+}
+
 #[test]
 fn the_error_of_a_held_control_is_of_second_order() {
     let rigid = (SpringBlock { k: f64::INFINITY, ..SLOW.0 }, SLOW.1, SLOW.2);

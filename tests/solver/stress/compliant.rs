@@ -12,7 +12,7 @@ use super::{POINTS, Row, sample};
 /// More quadrature nodes than any point takes.
 const MOST_NODES: u32 = 150_000;
 
-/// Steps at which simulations are given up.
+/// Steps at which two simulations are given up.
 const MOST_STEPS: u32 = 400_000;
 
 /// Open loops are simulated: three times up to a hundred thousand steps.
