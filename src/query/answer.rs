@@ -3,9 +3,8 @@
 use std::io::{self, Write};
 use std::sync::Arc;
 
-use arrow_array::builder::StringDictionaryBuilder;
 use arrow_array::types::Int32Type;
-use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
@@ -20,7 +19,7 @@ use rayon::prelude::*;
 
 use super::plan;
 use super::scan::{Files, append};
-use super::streaming::{Key, PARTS, StreamPlan};
+use super::streaming::{GroupPlan, Key, PARTS, StreamPlan};
 use crate::dataset::{Cell, field, guarded, label};
 
 /// Rows of a batch. Chosen: few enough that a reader sees the first ones soon.
@@ -31,10 +30,12 @@ const MAX_PARTIAL_ROWS: usize = 1 << 22;
 
 /// An answer, computed while it is read.
 pub struct Answer {
-    columns: Vec<String>,
-    units: Vec<String>,
-    frame: LazyFrame,
-    streaming: Option<(Files, StreamPlan)>,
+    pub(super) columns: Vec<String>,
+    /// One for each column.
+    pub(super) units: Vec<String>,
+    pub(super) frame: LazyFrame,
+    /// Its computation part by part, if possible.
+    pub(super) streaming: Option<StreamPlan>,
 }
 
 /// The format of an answer in a file.
@@ -77,16 +78,6 @@ impl From<ParquetError> for AnswerError {
 type BatchHandler<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
-    /// The answer from `frame`, with `columns` in these `units`; or from `streaming` of files.
-    pub(super) fn new(
-        frame: LazyFrame,
-        columns: Vec<String>,
-        units: Vec<String>,
-        streaming: Option<(Files, StreamPlan)>,
-    ) -> Answer {
-        Answer { columns, units, frame, streaming }
-    }
-
     /// The names of its columns.
     pub fn columns(&self) -> Vec<String> {
         self.columns.clone()
@@ -156,10 +147,8 @@ impl Answer {
     fn for_each_batch(self, take: BatchHandler) -> Result<(), AnswerError> {
         let Answer { frame, streaming, .. } = self;
         match streaming {
-            Some((files, streaming)) if streaming.merge.is_none() && streaming.keys.is_empty() => {
-                stream(&files, &streaming, take)
-            }
-            Some((files, streaming)) => match guarded(|| combine(&files, &streaming)) {
+            Some(streaming) if streaming.groups.is_none() && streaming.keys.is_empty() => stream(&streaming, take),
+            Some(streaming) => match guarded(|| combine(&streaming)) {
                 Some(Ok(found)) => pass_on(&found, take),
                 // An answer that cannot be merged may be computed at once; if that fails, its error is reported.
                 _ => pass_on(&whole(frame)?, take),
@@ -180,14 +169,7 @@ fn unsupported() -> PolarsError {
 
 /// Passes `found` on, batch by batch.
 fn pass_on(found: &DataFrame, take: BatchHandler) -> Result<(), AnswerError> {
-    let mut start = 0;
-    loop {
-        take(&found.slice(start as i64, BATCH_ROWS))?;
-        start += BATCH_ROWS;
-        if start >= found.height() {
-            return Ok(());
-        }
-    }
+    (0..found.height().max(1)).step_by(BATCH_ROWS).try_for_each(|start| take(&found.slice(start as i64, BATCH_ROWS)))
 }
 
 /// Number of batches in progress. Chosen: several for each thread, so that no thread waits long for another.
@@ -195,25 +177,22 @@ fn at_once() -> usize {
     4 * rayon::current_num_threads()
 }
 
-/// The results of `files`, in their order.
-fn partial_answers(files: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> {
-    let answer = |files: &Files| match &streaming.groups {
-        Some(groups) => files.groups(groups),
-        None => {
-            let rows = files.clone().only(streaming.conditions.clone(), streaming.top.clone());
-            guarded(|| plan([(streaming.table.as_str(), rows.frame()?)], &streaming.partial)?.collect())
-                .unwrap_or_else(|| Err(unsupported()))
-        }
+/// The results of `parts`, in their order.
+fn partial_answers(parts: &[Files], streaming: &StreamPlan) -> PolarsResult<Vec<DataFrame>> {
+    let answer = |part: &Files| match &streaming.groups {
+        Some(GroupPlan { columns: Some(groups), .. }) => part.groups(groups),
+        _ => guarded(|| plan([(streaming.table.as_str(), part.frame()?)], &streaming.partial)?.collect())
+            .unwrap_or_else(|| Err(unsupported())),
     };
-    files.par_iter().map(answer).collect()
+    parts.par_iter().map(answer).collect()
 }
 
 /// Passes rows on as they are read.
-fn stream(files: &Files, streaming: &StreamPlan, take: BatchHandler) -> Result<(), AnswerError> {
+fn stream(streaming: &StreamPlan, take: BatchHandler) -> Result<(), AnswerError> {
     let mut skip = streaming.offset;
     let mut left = streaming.limit;
     let mut first = true;
-    for wave in files.streaming().chunks(at_once()) {
+    for wave in streaming.files.parts().chunks(at_once()) {
         for mut found in partial_answers(wave, streaming)? {
             let skipped = skip.min(found.height());
             skip -= skipped;
@@ -231,12 +210,12 @@ fn stream(files: &Files, streaming: &StreamPlan, take: BatchHandler) -> Result<(
 }
 
 /// The answer, merged from partial answers.
-fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
+fn combine(streaming: &StreamPlan) -> PolarsResult<DataFrame> {
     let most = streaming.limit.map(|limit| limit.saturating_add(streaming.offset));
     let mut parts = DataFrame::default();
-    for wave in files.streaming().chunks(at_once()) {
+    for wave in streaming.files.parts().chunks(at_once()) {
         for part in partial_answers(wave, streaming)? {
-            let part = if streaming.merge.is_some() { part } else { ordered(part, &streaming.keys, 0, most)? };
+            let part = if streaming.groups.is_some() { part } else { ordered(part, &streaming.keys, 0, most)? };
             append(&mut parts, part)?;
         }
         if parts.height() > MAX_PARTIAL_ROWS {
@@ -244,7 +223,7 @@ fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
         }
     }
     parts = merged(parts, streaming, most)?;
-    if let Some(finish) = &streaming.finish {
+    if let Some(GroupPlan { finish, .. }) = &streaming.groups {
         parts = plan([(PARTS, parts.lazy())], finish)?.collect()?;
     }
     ordered(parts, &streaming.keys, streaming.offset, streaming.limit)?
@@ -252,8 +231,8 @@ fn combine(files: &Files, streaming: &StreamPlan) -> PolarsResult<DataFrame> {
 }
 
 fn merged(parts: DataFrame, streaming: &StreamPlan, most: Option<usize>) -> PolarsResult<DataFrame> {
-    match &streaming.merge {
-        Some(merge) => plan([(PARTS, parts.lazy())], merge)?.collect(),
+    match &streaming.groups {
+        Some(GroupPlan { merge, .. }) => plan([(PARTS, parts.lazy())], merge)?.collect(),
         None => ordered(parts, &streaming.keys, 0, most),
     }
 }
@@ -345,8 +324,7 @@ fn without_lists(batch: &DataFrame, format: &str) -> PolarsResult<()> {
 
 /// The Parquet schema of a batch, with units.
 fn arrow_schema(batch: &DataFrame, units: &[String]) -> SchemaRef {
-    let columns = batch.columns().iter().zip(units.iter().map(String::as_str).chain(std::iter::repeat("")));
-    let fields = columns.map(|(column, unit)| {
+    let fields = batch.columns().iter().zip(units).map(|(column, unit)| {
         let kind = match column.dtype() {
             kind if kind.is_float() => ArrowType::Float64,
             kind if kind.is_integer() => ArrowType::Int64,
@@ -370,9 +348,7 @@ fn record_batch(batch: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, An
             ArrowType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
             ArrowType::Dictionary(..) => {
                 let text = series.cast(&DataType::String)?;
-                let mut words = StringDictionaryBuilder::<Int32Type>::new();
-                text.str()?.iter().for_each(|word| words.append_option(word));
-                Arc::new(words.finish())
+                Arc::new(text.str()?.iter().collect::<DictionaryArray<Int32Type>>())
             }
             _ => {
                 let word = |value: AnyValue| match value {

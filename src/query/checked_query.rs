@@ -14,6 +14,7 @@ use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 
 use super::Source;
+use super::scan::Files;
 use super::units::{Columns, units};
 use super::walk::{Visit, walk};
 use crate::names::hint;
@@ -89,7 +90,7 @@ impl CheckedQuery {
         if let Some(fault) = check.fault {
             return Err(fault);
         }
-        let words = sources.iter().flat_map(|source| source.words.iter().cloned()).collect();
+        let words = sources.iter().flat_map(|source| &source.files).flat_map(Files::words).collect();
         walk(query.as_mut(), &mut Names);
         let columns = |source: &Source| source.columns.iter().cloned().zip(source.units.iter().cloned()).collect();
         let tables = sources.iter().map(|source| (source.name.clone(), columns(source))).collect();
@@ -117,8 +118,8 @@ impl Check<'_> {
         }
     }
 
-    fn refuse(&mut self, fault: InvalidQuery) -> ControlFlow<()> {
-        self.fault = Some(fault);
+    fn refuse(&mut self, found: impl Into<String>, help: impl Into<String>) -> ControlFlow<()> {
+        self.fault = Some(InvalidQuery::new(found, help));
         ControlFlow::Break(())
     }
 }
@@ -129,14 +130,13 @@ impl Visit for Check<'_> {
             let name = &table.alias.name.value;
             // polars would use the table of the dataset instead.
             if self.sources.iter().any(|source| source.name == *name) {
-                return self
-                    .refuse(InvalidQuery::new(format!("WITH {name}: a table has this name"), "choose another name"));
+                return self.refuse(format!("WITH {name}: a table has this name"), "choose another name");
             }
             self.tables.insert(name.clone());
         }
         match query.body.as_ref() {
             SetExpr::Insert(_) | SetExpr::Update(_) | SetExpr::Delete(_) | SetExpr::Merge(_) => {
-                self.refuse(InvalidQuery::new("refused: `query` reads and never writes", "write one SELECT"))
+                self.refuse("refused: `query` reads and never writes", "write one SELECT")
             }
             _ => ControlFlow::Continue(()),
         }
@@ -146,17 +146,17 @@ impl Visit for Check<'_> {
         let Expr::Function(function) = &*expression else { return ControlFlow::Continue(()) };
         let argument = first_argument(function).filter(|argument| is_constant(argument));
         if argument.is_some() && is_one_of(AGGREGATE_FUNCTIONS, function) {
-            return self.refuse(InvalidQuery::new(
+            return self.refuse(
                 format!("`{expression}`: no column in it"),
                 "count(*) counts rows; name a column for other aggregates",
-            ));
+            );
         }
         match &function.over {
             // polars would ignore the order.
-            Some(window) if self.is_ordered(window) && !is_one_of(ORDERED, function) => self.refuse(InvalidQuery::new(
+            Some(window) if self.is_ordered(window) && !is_one_of(ORDERED, function) => self.refuse(
                 format!("`{expression}`: no running `{}`", function.name),
                 "leave ORDER BY out; these take it: row_number, lag, lead, first_value, last_value, sum, count, min, max",
-            )),
+            ),
             _ => ControlFlow::Continue(()),
         }
     }
@@ -166,10 +166,10 @@ impl Visit for Check<'_> {
         let condition = joins.filter_map(|join| outer_condition(&join.join_operator));
         if let Some(condition) = condition.into_iter().find(|condition| !is_equalities(condition)) {
             // polars would apply the other conditions to the joined rows, and lose rows without a match.
-            return self.refuse(InvalidQuery::new(
+            return self.refuse(
                 format!("ON {condition}: an outer join compares columns with columns by ="),
                 "filter in a subquery: FROM a LEFT JOIN (SELECT * FROM b WHERE ...) AS b ON a.x = b.x",
-            ));
+            );
         }
         for NamedWindowDefinition(name, window) in &select.named_window {
             if matches!(window, NamedWindowExpr::WindowSpec(window) if !window.order_by.is_empty()) {
@@ -177,24 +177,24 @@ impl Visit for Check<'_> {
             }
         }
         if let Some(function) = select.selection.as_ref().and_then(first_aggregate) {
-            return self.refuse(InvalidQuery::new(
+            return self.refuse(
                 format!("WHERE contains the aggregate `{function}`, but it selects single rows"),
                 "write the condition in HAVING, after GROUP BY; for OVER, filter a subquery: FROM (SELECT ...) AS t WHERE ...",
-            ));
+            );
         }
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
         let mut items = select.projection.iter().filter_map(expression).chain(&select.qualify);
         if is_grouped && let Some(window) = items.find_map(first_window) {
-            return self.refuse(InvalidQuery::new(
+            return self.refuse(
                 format!("`{window}`: OVER and GROUP BY in one SELECT"),
                 "group in a subquery: SELECT ... OVER (...) FROM (SELECT ... GROUP BY ...) AS t",
-            ));
+            );
         }
         if select.into.is_some() {
-            return self.refuse(InvalidQuery::new(
+            return self.refuse(
                 "SELECT INTO writes a table, and `query` never does",
                 "leave INTO out; `--out FILE` writes the answer",
-            ));
+            );
         }
         ControlFlow::Continue(())
     }
@@ -203,16 +203,16 @@ impl Visit for Check<'_> {
         let name = match &*table {
             TableFactor::Table { name, args: None, .. } => name,
             TableFactor::Table { name, .. } => {
-                return self.refuse(InvalidQuery::new(
+                return self.refuse(
                     format!("`{name}(...)`: only the tables of the dataset can be read"),
                     "name another dataset or file on the command line instead",
-                ));
+                );
             }
             TableFactor::TableFunction { .. } | TableFactor::Function { .. } => {
-                return self.refuse(InvalidQuery::new(
+                return self.refuse(
                     "a function in FROM: only the tables of the dataset can be read",
                     "name another dataset or file on the command line instead",
-                ));
+                );
             }
             _ => return ControlFlow::Continue(()),
         };
@@ -224,7 +224,7 @@ impl Visit for Check<'_> {
             return ControlFlow::Continue(());
         }
         let help = hint(&word, self.sources.iter().map(|source| source.name.as_str()));
-        self.refuse(InvalidQuery::new(format!("no table `{word}`"), help))
+        self.refuse(format!("no table `{word}`"), help)
     }
 }
 
@@ -342,7 +342,7 @@ struct Names;
 impl Visit for Names {
     fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
         if let Some(mut having) = select.having.take() {
-            let keys = Keys::of(select);
+            let keys = keys_of(select);
             walk(&mut having, &mut HavingTerms { keys: &keys, projection: &select.projection, inside: 0 });
             select.having = Some(having);
         }
@@ -355,11 +355,7 @@ impl Visit for Names {
         for item in &mut select.projection {
             let (expression, name) = match item {
                 // It stands for several columns, which have names already.
-                SelectItem::UnnamedExpr(Expr::Function(function))
-                    if function.name.to_string().eq_ignore_ascii_case("columns") =>
-                {
-                    continue;
-                }
+                SelectItem::UnnamedExpr(Expr::Function(function)) if is_one_of("columns", function) => continue,
                 SelectItem::UnnamedExpr(expression) => (expression.clone(), name(expression)),
                 SelectItem::ExprWithAlias { alias, .. } => {
                     taken.insert(alias.value.clone());
@@ -396,21 +392,14 @@ impl Visit for Names {
 }
 
 /// The expressions of GROUP BY; a name that stands for an item of SELECT also as that item.
-struct Keys(Vec<Expr>);
-
-impl Keys {
-    fn of(select: &Select) -> Keys {
-        let items = || select.projection.iter().filter_map(expression).filter(|item| first_aggregate(item).is_none());
-        let GroupByExpr::Expressions(keys, _) = &select.group_by else { return Keys(items().cloned().collect()) };
-        let place = |key: &Expr| match key {
-            Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse::<usize>().ok(),
-            _ => None,
-        };
-        let numbered = keys.iter().filter_map(place).filter_map(|place| select.projection.get(place.checked_sub(1)?));
-        let named = keys.iter().filter_map(|key| meaning(key, &select.projection));
-        let written = keys.iter().filter(|key| place(key).is_none());
-        Keys(written.chain(named).chain(numbered.filter_map(expression)).cloned().collect())
-    }
+fn keys_of(select: &Select) -> Vec<Expr> {
+    let items = || select.projection.iter().filter_map(expression).filter(|item| first_aggregate(item).is_none());
+    let GroupByExpr::Expressions(keys, _) = &select.group_by else { return items().cloned().collect() };
+    let places = keys.iter().filter_map(whole_number);
+    let numbered = places.filter_map(|place| select.projection.get(place.checked_sub(1)?));
+    let named = keys.iter().filter_map(|key| meaning(key, &select.projection));
+    let written = keys.iter().filter(|key| whole_number(key).is_none());
+    written.chain(named).chain(numbered.filter_map(expression)).cloned().collect()
 }
 
 /// The item of SELECT that a name stands for.
@@ -425,7 +414,7 @@ fn meaning<'a>(name: &Expr, projection: &'a [SelectItem]) -> Option<&'a Expr> {
 /// The visitor that writes HAVING in aggregates of the columns of the table: polars does not know the keys of the groups there, nor other names
 /// together with aggregates.
 struct HavingTerms<'a> {
-    keys: &'a Keys,
+    keys: &'a [Expr],
     projection: &'a [SelectItem],
     /// Depth in aggregates and subqueries, whose columns keep their meaning.
     inside: u32,
@@ -443,8 +432,7 @@ impl Visit for HavingTerms<'_> {
 
     fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         if self.inside == 0 {
-            let least = |key: &Expr| Expr::Function(aggregate("min", key.clone()));
-            if self.keys.0.contains(expression) {
+            if self.keys.contains(expression) {
                 *expression = least(expression);
             } else if let Some(item) = meaning(expression, self.projection) {
                 *expression =
@@ -461,15 +449,15 @@ impl Visit for HavingTerms<'_> {
     }
 }
 
-/// The aggregate `called` of an expression.
-fn aggregate(called: &str, argument: Expr) -> Function {
+/// The least value of an expression.
+fn least(argument: &Expr) -> Expr {
     let list = FunctionArgumentList {
         duplicate_treatment: None,
-        args: vec![FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))],
+        args: vec![FunctionArg::Unnamed(FunctionArgExpr::Expr(argument.clone()))],
         clauses: Vec::new(),
     };
-    Function {
-        name: ObjectName::from(vec![Ident::new(called)]),
+    Expr::Function(Function {
+        name: ObjectName::from(vec![Ident::new("min")]),
         uses_odbc_syntax: false,
         parameters: FunctionArguments::None,
         args: FunctionArguments::List(list),
@@ -477,7 +465,7 @@ fn aggregate(called: &str, argument: Expr) -> Function {
         null_treatment: None,
         over: None,
         within_group: Vec::new(),
-    }
+    })
 }
 
 /// The name of a column without `AS`, as in DuckDB; `count(*)` is `count`.
@@ -596,12 +584,12 @@ impl Visit for PolarsDialect {
 /// Whether `condition`, after `operator`, is true or null.
 fn or_null(condition: &Expr, operator: Option<UnaryOperator>) -> Expr {
     let condition = Box::new(Expr::Nested(Box::new(condition.clone())));
-    let is_null = Box::new(Expr::IsNull(condition.clone()));
+    let is_null = Expr::IsNull(condition.clone());
     let holds = match operator {
-        Some(op) => Box::new(Expr::UnaryOp { op, expr: condition }),
-        None => condition,
+        Some(op) => Expr::UnaryOp { op, expr: condition },
+        None => *condition,
     };
-    Expr::Nested(Box::new(Expr::BinaryOp { left: is_null, op: BinaryOperator::Or, right: holds }))
+    Expr::Nested(Box::new(binary(is_null, BinaryOperator::Or, holds)))
 }
 
 /// Gives the nulls of the first key of a window their place. polars puts them first in either direction.
@@ -610,16 +598,9 @@ fn order_nulls(keys: &mut Vec<OrderByExpr>) {
     let descends = first.options.asc == Some(false);
     let nulls_first = first.options.nulls_first.unwrap_or(descends);
     // Of 0 and 1, the one that comes first in this direction.
-    let place =
-        |comes_first: bool| Box::new(Expr::value(Value::Number(u8::from(comes_first == descends).to_string(), false)));
-    let null = CaseWhen { condition: Expr::IsNull(Box::new(first.expr.clone())), result: *place(nulls_first) };
-    let expr = Expr::Case {
-        case_token: AttachedToken::empty(),
-        end_token: AttachedToken::empty(),
-        operand: None,
-        conditions: vec![null],
-        else_result: Some(place(!nulls_first)),
-    };
+    let place = |comes_first: bool| number(if comes_first == descends { "1" } else { "0" });
+    let is_null = Expr::IsNull(Box::new(first.expr.clone()));
+    let expr = case(is_null, place(nulls_first), Some(place(!nulls_first)));
     keys.insert(0, OrderByExpr { expr, ..first });
     keys.iter_mut().for_each(|key| key.options.nulls_first = None);
 }
@@ -663,23 +644,40 @@ fn sum(function: &Function) -> Option<Expr> {
         && list.duplicate_treatment.is_none()
         && list.clauses.is_empty()
         && list.args.len() == 1;
-    if !is_plain || !function.name.to_string().eq_ignore_ascii_case("sum") {
+    if !is_plain || !is_one_of("sum", function) {
         return None;
     }
     let count = Function { name: ObjectName::from(vec![Ident::new("count")]), ..function.clone() };
-    let zero = Expr::value(Value::Number("0".to_owned(), false));
-    let some = Expr::BinaryOp { left: Box::new(Expr::Function(count)), op: BinaryOperator::Gt, right: Box::new(zero) };
-    Some(if_else_null(some, Expr::Function(function.clone())))
+    let some = binary(Expr::Function(count), BinaryOperator::Gt, number("0"));
+    Some(case(some, Expr::Function(function.clone()), None))
 }
 
-/// `result` where `condition` holds, else null.
-pub fn if_else_null(condition: Expr, result: Expr) -> Expr {
+/// `result` where `condition` holds, else `other` or null.
+pub fn case(condition: Expr, result: Expr, other: Option<Expr>) -> Expr {
     Expr::Case {
         case_token: AttachedToken::empty(),
         end_token: AttachedToken::empty(),
         operand: None,
         conditions: vec![CaseWhen { condition, result }],
-        else_result: None,
+        else_result: other.map(Box::new),
+    }
+}
+
+/// `left` and `right`, joined by an operator.
+pub fn binary(left: Expr, op: BinaryOperator, right: Expr) -> Expr {
+    Expr::BinaryOp { left: Box::new(left), op, right: Box::new(right) }
+}
+
+/// A number.
+pub fn number(digits: &str) -> Expr {
+    Expr::value(Value::Number(digits.to_owned(), false))
+}
+
+/// The value of a whole number without a sign.
+pub fn whole_number(expression: &Expr) -> Option<usize> {
+    match expression {
+        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse().ok(),
+        _ => None,
     }
 }
 

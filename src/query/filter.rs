@@ -7,9 +7,11 @@ use arrow_schema::DataType as ArrowType;
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::statistics::Statistics;
 use polars::lazy::dsl::{Expr, Operator};
-use polars::prelude::{AnyValue, DataType, LiteralValue, Schema};
+use polars::prelude::{AnyValue, LiteralValue, Schema};
 use polars::sql::sql_expr;
 
+use super::groups::Kind;
+use super::streaming::Key;
 use crate::dataset::label;
 
 /// A predicate: the comparison of a column with a constant. Null never matches.
@@ -48,12 +50,10 @@ pub fn of_predicate(predicate: &Expr) -> (Vec<Condition>, bool) {
 pub fn of_where(condition: Option<&sqlparser::ast::Expr>, schema: &Schema) -> Option<Vec<Condition>> {
     let Some(condition) = condition else { return Some(Vec::new()) };
     let (conditions, is_whole) = of_predicate(&sql_expr(condition.to_string()).ok()?);
-    let fits = |condition: &Condition| match (&condition.constant, schema.get(&condition.column)) {
-        (Constant::Number(_), Some(kind)) => *kind == DataType::Float64,
-        (Constant::Word(_), Some(kind)) => {
-            matches!(condition.comparison, Operator::Eq | Operator::NotEq) && kind.is_categorical()
-        }
-        (_, None) => false,
+    let fits = |condition: &Condition| match (&condition.constant, Kind::of(&condition.column, schema)) {
+        (Constant::Number(_), Some(Kind::Number)) => true,
+        (Constant::Word(_), Some(Kind::Word)) => matches!(condition.comparison, Operator::Eq | Operator::NotEq),
+        _ => false,
     };
     (is_whole && conditions.iter().all(fits)).then_some(conditions)
 }
@@ -169,10 +169,8 @@ pub fn kept(conditions: &[Condition], batch: &RecordBatch) -> Vec<bool> {
 pub struct Top {
     /// The column.
     pub column: String,
-    /// Whether the order is descending.
-    pub descending: bool,
-    /// Whether nulls come last.
-    pub nulls_last: bool,
+    /// Its direction.
+    pub key: Key,
     /// The number of rows.
     pub most: usize,
     /// Whether rows that are equal in this column stay in the order of the table.
@@ -185,10 +183,10 @@ impl Top {
         let Some(array) = batch.column_by_name(&self.column) else { return };
         let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
         // Keys in the order of the rows. NaN is the greatest number.
-        let key = |row: usize| match (array.is_null(row), self.nulls_last) {
+        let key = |row: usize| match (array.is_null(row), self.key.nulls_last) {
             (true, true) => i64::MAX,
             (true, false) => i64::MIN,
-            (false, _) if self.descending => -in_order(array.value(row)),
+            (false, _) if self.key.descending => -in_order(array.value(row)),
             (false, _) => in_order(array.value(row)),
         };
         let Some(last) = self.most.checked_sub(1) else { return kept.fill(false) };
@@ -225,7 +223,7 @@ mod tests {
 
     use arrow_array::{ArrayRef, Float64Array, RecordBatch};
 
-    use super::Top;
+    use super::{Key, Top};
 
     #[test]
     fn the_first_rows_are_kept() {
@@ -234,7 +232,8 @@ mod tests {
         let batch = RecordBatch::try_from_iter([("x", array)]).expect("is a table");
         let first = |descending, nulls_last, most, alone| {
             let mut kept = vec![true; 6];
-            Top { column: "x".to_owned(), descending, nulls_last, most, is_only_key: alone }.mark(&batch, &mut kept);
+            let key = Key { descending, nulls_last };
+            Top { column: "x".to_owned(), key, most, is_only_key: alone }.mark(&batch, &mut kept);
             (0..6).filter(|&row| kept[row]).collect::<Vec<_>>()
         };
         assert_eq!(first(false, true, 1, true), [2]);

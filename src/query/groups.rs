@@ -12,31 +12,43 @@ use polars::prelude::{
     PolarsResult, Schema, StringChunked,
 };
 
-use super::filter::{Condition, kept};
-
 /// An aggregate of a group.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Aggregate {
-    /// Its number of rows.
-    Rows,
-    /// The number of values of a column.
-    Count(String),
-    /// The sum of a column.
-    Sum(String),
-    /// The least number of a column.
-    Least(String),
-    /// The greatest number of a column.
-    Greatest(String),
+pub struct Aggregate {
+    pub measure: Measure,
+    /// The argument in SQL; `*` counts rows.
+    pub argument: String,
+    /// The column of the argument, if it is one.
+    pub column: Option<String>,
+}
+
+/// What an aggregate measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    Count,
+    Sum,
+    Least,
+    Greatest,
+}
+
+impl Measure {
+    /// The function that merges the values of parts.
+    pub fn merged_by(self) -> &'static str {
+        match self {
+            Measure::Count | Measure::Sum => "sum",
+            Measure::Least => "min",
+            Measure::Greatest => "max",
+        }
+    }
 }
 
 impl Aggregate {
-    /// The column.
-    pub fn column(&self) -> Option<&str> {
-        match self {
-            Aggregate::Rows => None,
-            Aggregate::Count(name) | Aggregate::Sum(name) | Aggregate::Least(name) | Aggregate::Greatest(name) => {
-                Some(name)
-            }
+    /// The aggregate in SQL.
+    pub fn sql(&self) -> String {
+        let argument = &self.argument;
+        match self.measure {
+            Measure::Count => format!("CAST(count({argument}) AS BIGINT)"),
+            other => format!("{}({argument})", other.merged_by()),
         }
     }
 }
@@ -63,35 +75,31 @@ impl Kind {
     }
 }
 
-/// A query for groups.
+/// A query for groups, which needs columns alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupQuery {
-    /// The condition of rows.
-    pub conditions: Vec<Condition>,
     /// The key columns of the groups.
-    pub keys: Vec<(String, Kind)>,
+    keys: Vec<(String, Kind)>,
     /// The aggregates of each group.
-    pub aggregates: Vec<Aggregate>,
+    aggregates: Vec<Aggregate>,
 }
 
 impl GroupQuery {
-    /// Whether the types of all aggregated columns are supported.
-    pub fn fits(&self, schema: &Schema) -> bool {
-        self.aggregates.iter().all(|aggregate| match aggregate {
-            Aggregate::Rows => true,
-            Aggregate::Count(name) => schema.get(name).is_some(),
-            other => other.column().is_some_and(|name| Kind::of(name, schema) == Some(Kind::Number)),
-        })
+    /// The query for `aggregates` of the groups of `keys`; `None` if it needs more than columns of supported types.
+    pub fn new(keys: Vec<String>, aggregates: Vec<Aggregate>, schema: &Schema) -> Option<GroupQuery> {
+        let is_supported = |aggregate: &Aggregate| match (&aggregate.column, aggregate.measure) {
+            (None, _) => aggregate.argument == "*",
+            (Some(name), Measure::Count) => schema.contains(name),
+            (Some(name), _) => Kind::of(name, schema) == Some(Kind::Number),
+        };
+        let keys = keys.into_iter().map(|key| Kind::of(&key, schema).map(|kind| (key, kind))).collect::<Option<_>>()?;
+        aggregates.iter().all(is_supported).then_some(GroupQuery { keys, aggregates })
     }
 
     /// The columns to read.
-    pub fn columns(&self) -> Vec<String> {
-        let measured = self.aggregates.iter().filter_map(|aggregate| aggregate.column().map(str::to_owned));
-        let mut names: Vec<String> = self.keys.iter().map(|(name, _)| name.clone()).chain(measured).collect();
-        names.extend(self.conditions.iter().map(|condition| condition.column.clone()));
-        names.sort();
-        names.dedup();
-        names
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        let measured = self.aggregates.iter().filter_map(|aggregate| aggregate.column.as_deref());
+        self.keys.iter().map(|(name, _)| name.as_str()).chain(measured)
     }
 }
 
@@ -159,36 +167,35 @@ impl<'a> GroupAggregation<'a> {
 
     fn grow(&mut self) {
         for (aggregate, states) in self.groups.aggregates.iter().zip(&mut self.states) {
-            let number = if matches!(aggregate, Aggregate::Sum(_)) { 0.0 } else { f64::NAN };
+            let number = if aggregate.measure == Measure::Sum { 0.0 } else { f64::NAN };
             states.resize(self.count, AggregateState { count: 0, number });
         }
     }
 
-    /// Adds the rows of a batch.
-    pub fn add(&mut self, batch: &RecordBatch) {
-        let kept = kept(&self.groups.conditions, batch);
-        let rows: Vec<u32> = (0..).zip(&kept).filter(|(_, kept)| **kept).map(|(row, _)| row).collect();
+    /// Adds the `kept` rows of a batch.
+    pub fn add(&mut self, batch: &RecordBatch, kept: &[bool]) {
+        let rows: Vec<u32> = (0..).zip(kept).filter(|(_, kept)| **kept).map(|(row, _)| row).collect();
         let ids = self.ids(batch, &rows);
         self.grow();
         for (aggregate, states) in self.groups.aggregates.iter().zip(&mut self.states) {
-            let array = aggregate.column().and_then(|name| batch.column_by_name(name));
+            let array = aggregate.column.as_ref().and_then(|name| batch.column_by_name(name));
             let Some(array) = array else {
                 ids.iter().for_each(|&id| states[id as usize].count += 1);
                 continue;
             };
             let cells = ids.iter().zip(&rows).filter(|(_, row)| array.is_valid(**row as usize));
-            if let Aggregate::Count(_) = aggregate {
+            if aggregate.measure == Measure::Count {
                 cells.for_each(|(&id, _)| states[id as usize].count += 1);
                 continue;
             }
             let numbers = array.as_primitive::<Float64Type>().values();
             let cells = cells.map(|(&id, &row)| (id as usize, numbers[row as usize]));
-            match aggregate {
-                Aggregate::Sum(_) => cells.for_each(|(id, number)| {
+            match aggregate.measure {
+                Measure::Sum => cells.for_each(|(id, number)| {
                     states[id].count += 1;
                     states[id].number += number;
                 }),
-                Aggregate::Least(_) => tally(cells, states, |number, least| number < least),
+                Measure::Least => tally(cells, states, |number, least| number < least),
                 _ => tally(cells, states, |number, greatest| number > greatest),
             }
         }
@@ -243,11 +250,11 @@ impl<'a> GroupAggregation<'a> {
         }
         for (index, (aggregate, states)) in self.groups.aggregates.iter().zip(&self.states).enumerate() {
             let name = format!("__a{index}").into();
-            columns.push(match aggregate {
-                Aggregate::Rows | Aggregate::Count(_) => {
+            columns.push(match aggregate.measure {
+                Measure::Count => {
                     Int64Chunked::from_iter_values(name, states.iter().map(|tally| tally.count)).into_column()
                 }
-                Aggregate::Sum(_) => {
+                Measure::Sum => {
                     Float64Chunked::from_iter_values(name, states.iter().map(|tally| tally.number)).into_column()
                 }
                 _ => {

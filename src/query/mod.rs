@@ -82,11 +82,6 @@ impl Tables {
         source::open(path).map(|sources| Tables { sources })
     }
 
-    /// The table of this name.
-    pub fn find(&self, name: &str) -> Option<&Source> {
-        self.sources.iter().find(|source| source.name == name)
-    }
-
     /// The answer to a SQL query, computed when it is read.
     ///
     /// # Errors
@@ -109,10 +104,9 @@ impl Tables {
             known.map_or_else(String::new, |(_, unit)| unit.clone())
         };
         let units = columns.iter().map(unit).collect();
-        let streaming =
-            streaming::streaming(&checked.query, &self.sources).filter(|streaming| streaming.names == columns);
-        let streaming = streaming.and_then(|streaming| Some((self.find(&streaming.table)?.files.clone()?, streaming)));
-        Ok(Answer::new(frame, columns, units, streaming))
+        let streaming = streaming::streaming(&checked.query, &self.sources);
+        let streaming = streaming.filter(|streaming| streaming.names == columns);
+        Ok(Answer { columns, units, frame, streaming })
     }
 
     fn parse(&self, sql: &str) -> Result<CheckedQuery, QueryError> {

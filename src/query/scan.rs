@@ -1,6 +1,7 @@
 //! Parquet files as a table of polars. Only the needed columns and row groups are read, on all threads.
 
 use std::any::Any;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use arrow_array::types::{
     ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type,
     UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, BooleanArray, RecordBatch, RecordBatchOptions};
+use arrow_array::{Array, BooleanArray, RecordBatch, new_empty_array};
 use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema};
 use arrow_select::filter::filter_record_batch;
 use parquet::arrow::ProjectionMask;
@@ -46,7 +47,7 @@ impl Files {
         let mut schema = Schema::default();
         if let Some(first) = paths.first() {
             for field in sound(first, || open(first))?.1.schema().fields() {
-                schema.insert(PlSmallStr::from_str(field.name()), kind(field.data_type()).unwrap_or(DataType::Null));
+                schema.insert(PlSmallStr::from_str(field.name()), kind(field.data_type()));
             }
         }
         Ok(Files { paths, schema: Arc::new(schema), conditions: Vec::new(), top: None })
@@ -66,12 +67,11 @@ impl Files {
     /// The groups of all rows.
     pub fn groups(&self, groups: &GroupQuery) -> PolarsResult<DataFrame> {
         let mut aggregation = GroupAggregation::new(groups);
-        let names = groups.columns();
         for path in &self.paths {
             sound(path, || {
-                batches(path, (&names, &self.schema), &groups.conditions, None, &mut |batch| {
-                    aggregation.add(&batch);
-                    Ok(batch.num_rows())
+                self.batches(path, groups.columns(), &self.conditions, None, &mut |batch, kept| {
+                    aggregation.add(&batch, &kept);
+                    Ok(kept.len())
                 })
             })?;
         }
@@ -91,7 +91,7 @@ impl Files {
     }
 
     /// Each file as a separate table.
-    pub fn streaming(&self) -> Vec<Files> {
+    pub fn parts(&self) -> Vec<Files> {
         self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
     }
 
@@ -227,44 +227,42 @@ fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     Ok((file, metadata))
 }
 
-/// Passes the columns `names` of a file, with the types of `schema`, to `take`, one row group at a time. Skips row groups without rows that
-/// match `conditions`. Ends when `take`, which returns the number of kept rows, has `most`.
-fn batches(
-    path: &Path,
-    (names, schema): (&[String], &Schema),
-    conditions: &[Condition],
-    most: Option<usize>,
-    take: &mut dyn FnMut(RecordBatch) -> Result<usize, ParquetError>,
-) -> Result<(), ParquetError> {
-    let (file, metadata) = open(path)?;
-    check_pages(&file, metadata.metadata())?;
-    for name in names {
-        let found = metadata.schema().field_with_name(name).ok();
-        let found = found.map(|field| kind(field.data_type()).unwrap_or(DataType::Null));
-        if found.as_ref() != schema.get(name) {
-            let found = found.map_or("is missing".to_owned(), |kind| format!("has the type {kind}"));
-            return Err(ParquetError::General(format!("column `{name}` {found}, unlike in the first file")));
+impl Files {
+    /// Passes the columns `names` of a file and those of `conditions` to `take`, one row group at a time, with the rows that match `conditions`.
+    /// Skips row groups without such rows. Ends when `take`, which returns the number of kept rows, has `most`.
+    fn batches<'a>(
+        &self,
+        path: &Path,
+        names: impl Iterator<Item = &'a str>,
+        conditions: &'a [Condition],
+        most: Option<usize>,
+        take: &mut dyn FnMut(RecordBatch, Vec<bool>) -> Result<usize, ParquetError>,
+    ) -> Result<(), ParquetError> {
+        let (file, metadata) = open(path)?;
+        check_pages(&file, metadata.metadata())?;
+        let names: BTreeSet<&str> = names.chain(conditions.iter().map(|condition| condition.column.as_str())).collect();
+        for name in &names {
+            let found = metadata.schema().field_with_name(name).ok();
+            let found = found.map(|field| kind(field.data_type()));
+            if found.as_ref() != self.schema.get(name) {
+                let found = found.map_or("is missing".to_owned(), |kind| format!("has the type {kind}"));
+                return Err(ParquetError::General(format!("column `{name}` {found}, unlike in the first file")));
+            }
         }
-    }
-    // Statistics of other writers exclude NaN, which is the greatest number in polars.
-    let is_ours = is_ours(&metadata);
-    let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
-    let mask = ProjectionMask::columns(metadata.parquet_schema(), names.iter().map(String::as_str));
-    let mut missing = most;
-    for (index, group) in metadata.metadata().row_groups().iter().enumerate() {
-        if missing == Some(0) {
-            break;
-        }
-        if !allows(group) {
-            continue;
-        }
-        let rows = usize::try_from(group.num_rows()).unwrap_or(0);
-        let wanted = missing.map_or(rows, |missing| rows.min(missing));
-        let mut took = 0;
-        if names.is_empty() {
-            let options = RecordBatchOptions::new().with_row_count(Some(wanted));
-            took += take(RecordBatch::try_new_with_options(Arc::new(ArrowSchema::empty()), Vec::new(), &options)?)?;
-        } else {
+        // Statistics of other writers exclude NaN, which is the greatest number in polars.
+        let is_ours = is_ours(&metadata);
+        let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
+        let mask = ProjectionMask::columns(metadata.parquet_schema(), names.iter().copied());
+        let mut missing = most;
+        for (index, group) in metadata.metadata().row_groups().iter().enumerate() {
+            if missing == Some(0) {
+                break;
+            }
+            if !allows(group) {
+                continue;
+            }
+            let rows = usize::try_from(group.num_rows()).unwrap_or(0);
+            let wanted = missing.map_or(rows, |missing| rows.min(missing));
             let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file.try_clone()?, metadata.clone());
             let reader = builder
                 .with_row_groups(vec![index])
@@ -272,16 +270,17 @@ fn batches(
                 .with_batch_size(wanted.max(1))
                 .with_limit(wanted)
                 .build()?;
+            let mut took = 0;
             for batch in reader {
-                took += take(batch?)?;
+                let batch = batch?;
+                let kept = kept(conditions, &batch);
+                took += take(batch, kept)?;
             }
+            missing = missing.map(|missing| missing - took.min(missing));
         }
-        missing = missing.map(|missing| missing - took.min(missing));
+        Ok(())
     }
-    Ok(())
-}
 
-impl Files {
     /// The columns `names` of the rows of a file that `predicate` may keep.
     fn decode(
         &self,
@@ -292,16 +291,11 @@ impl Files {
     ) -> Result<DataFrame, ParquetError> {
         let mut conditions = self.conditions.clone();
         conditions.extend(predicate.into_iter().flat_map(|predicate| of_predicate(predicate).0));
-        let mut read: Vec<String> = names.iter().map(ToString::to_string).collect();
-        read.extend(conditions.iter().map(|condition| condition.column.clone()));
-        read.extend(self.top.iter().map(|top| top.column.clone()));
-        read.sort();
-        read.dedup();
+        let names_read = names.iter().map(PlSmallStr::as_str).chain(self.top.iter().map(|top| top.column.as_str()));
         // A filter drops rows, so more have to be read.
         let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
         let mut frame = self.empty(names).map_err(foreign)?;
-        batches(path, (&read, &self.schema), &conditions, most, &mut |batch| {
-            let mut kept = kept(&conditions, &batch);
+        self.batches(path, names_read, &conditions, most, &mut |batch, mut kept| {
             if let Some(top) = &self.top {
                 top.mark(&batch, &mut kept);
             }
@@ -337,25 +331,9 @@ fn columns(batch: &RecordBatch, names: &[PlSmallStr]) -> Result<DataFrame, Parqu
     DataFrame::new(batch.num_rows(), columns?).map_err(foreign)
 }
 
-/// The type of a column in polars; `None` for an unsupported type.
-fn kind(kind: &ArrowType) -> Option<DataType> {
-    Some(match kind {
-        ArrowType::Float64 => DataType::Float64,
-        ArrowType::Float32 => DataType::Float32,
-        ArrowType::Int8 | ArrowType::Int16 | ArrowType::Int32 => DataType::Int32,
-        ArrowType::Int64 => DataType::Int64,
-        ArrowType::UInt8 | ArrowType::UInt16 | ArrowType::UInt32 => DataType::UInt32,
-        ArrowType::UInt64 => DataType::UInt64,
-        ArrowType::Boolean => DataType::Boolean,
-        ArrowType::Utf8 => DataType::String,
-        kind if *kind == label() => words_type(),
-        _ => return None,
-    })
-}
-
-/// Words that repeat.
-fn words_type() -> DataType {
-    DataType::from_categories(Categories::global())
+/// The type of a column in polars; `Null` for an unsupported type.
+fn kind(kind: &ArrowType) -> DataType {
+    series(&PlSmallStr::EMPTY, &new_empty_array(kind)).map_or(DataType::Null, |column| column.dtype().clone())
 }
 
 /// An array as a column of polars.
@@ -380,7 +358,7 @@ fn series(name: &PlSmallStr, array: &dyn Array) -> Result<Series, ParquetError> 
         kind if *kind == label() => {
             let codes = array.as_dictionary::<Int32Type>();
             let known = text(PlSmallStr::EMPTY, codes.values().as_string::<i32>().iter());
-            let words = known.cast(&words_type()).map_err(foreign)?;
+            let words = known.cast(&DataType::from_categories(Categories::global())).map_err(foreign)?;
             let places = codes.keys().iter().map(|key| key.and_then(|key| u32::try_from(key).ok()));
             let places: IdxCa = places.collect();
             words.take(&places).map_err(foreign)?.with_name(name)

@@ -27,8 +27,6 @@ pub struct Source {
     pub missing: u64,
     /// The number of rows according to the dataset; `None` for a single file.
     pub rows: Option<u64>,
-    /// Its columns of words that repeat.
-    pub(super) words: Vec<String>,
     /// Its Parquet files.
     pub(super) files: Option<Files>,
     /// The table, read lazily.
@@ -113,12 +111,12 @@ impl Source {
         let failed = |path: &Path, source| QueryError::Read { path: path.display().to_string(), source };
         let first = paths.first().map_or(path, PathBuf::as_path);
         let (headings, facts) = frame::headings(first)
-            .map_err(|FrameError::File { reason, .. }| failed(first, PolarsError::ComputeError(reason.into())))?;
+            .map_err(|FrameError { reason, .. }| failed(first, PolarsError::ComputeError(reason.into())))?;
         let files = Files::new(paths.clone()).map_err(|source| failed(path, source))?;
         let frame = files.frame().map_err(|source| failed(path, source))?;
         let name = facts.into_iter().find(|(key, _)| key == "slipsweep.table").map_or(name, |(_, table)| table);
         let (columns, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
-        Ok(Source { name, columns, units, paths, missing, rows, words: files.words(), files: Some(files), frame })
+        Ok(Source { name, columns, units, paths, missing, rows, files: Some(files), frame })
     }
 
     /// The table in a CSV file. A column is numeric if all its cells are numbers; lines that begin with # are comments.
@@ -133,7 +131,6 @@ impl Source {
             paths: vec![path.to_owned()],
             missing: 0,
             rows: None,
-            words: Vec::new(),
             files: None,
             frame: frame.lazy(),
         })
@@ -145,8 +142,8 @@ impl Source {
     ///
     /// If the table cannot be read.
     pub fn first(&self, count: u32) -> Result<Answer, QueryError> {
-        let frame = self.frame.clone().limit(count);
-        Ok(Answer::new(frame, self.columns.clone(), self.units.clone(), None))
+        let (columns, units) = (self.columns.clone(), self.units.clone());
+        Ok(Answer { columns, units, frame: self.frame.clone().limit(count), streaming: None })
     }
 }
 

@@ -3,38 +3,33 @@
 //! Filtered rows are passed on as they are read. For `ORDER BY ... LIMIT` each part returns its first rows. For `GROUP BY` each part returns its
 //! groups with sums, counts, least and greatest values, which are then merged.
 
+use std::collections::HashSet;
 use std::ops::ControlFlow;
 
-use polars::prelude::Schema;
 use sqlparser::ast::{
-    BinaryOperator, DataType, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr, Ident,
-    LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, Value, ValueWithSpan,
+    BinaryOperator, DataType, ExactNumberInfo, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments,
+    GroupByExpr, Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
 use super::Source;
-use super::checked_query::{cast, if_else_null, is_one_of, name};
-use super::filter::{Condition, Top, of_where};
-use super::groups::{Aggregate, GroupQuery, Kind};
+use super::checked_query::{binary, case, cast, is_one_of, name, number, whole_number};
+use super::filter::{Top, of_where};
+use super::groups::{Aggregate, GroupQuery, Kind, Measure};
+use super::scan::Files;
 use super::walk::{Visit, walk};
 
 /// The plan of a query that is computed part by part.
 pub struct StreamPlan {
+    /// The files of the table, without rows that the answer does not need.
+    pub files: Files,
     /// The table.
     pub table: String,
     /// The query on each part.
     pub partial: String,
-    /// The plan of counts, sums and extremes of columns.
-    pub groups: Option<GroupQuery>,
-    /// The condition of all rows, if `WHERE` is a plain condition.
-    pub conditions: Vec<Condition>,
-    /// The order of rows by one column of numbers.
-    pub top: Option<Top>,
-    /// The query that merges partial answers in the table [`PARTS`]; `None` concatenates rows.
-    pub merge: Option<String>,
-    /// The query that computes the answer from the table [`PARTS`].
-    pub finish: Option<String>,
+    /// The plan for groups; `None` concatenates rows.
+    pub groups: Option<GroupPlan>,
     /// The order of rows by the columns `__k0`, `__k1`, ...
     pub keys: Vec<Key>,
     /// Rows to skip at the start.
@@ -43,6 +38,16 @@ pub struct StreamPlan {
     pub limit: Option<usize>,
     /// The columns of the answer.
     pub names: Vec<String>,
+}
+
+/// The plan that computes groups from those of the parts.
+pub struct GroupPlan {
+    /// The groups of a part, if they need columns alone: then they replace the query on each part.
+    pub columns: Option<GroupQuery>,
+    /// The query that merges partial answers in the table [`PARTS`].
+    pub merge: String,
+    /// The query that computes the answer from the table [`PARTS`].
+    pub finish: String,
 }
 
 /// The direction of a sort key.
@@ -71,16 +76,11 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     }
     // One table, without a function that needs all its rows.
     let (source, alias) = table_of(select, sources)?;
+    let files = source.files.clone()?;
     let mut select = select.as_ref().clone();
     let mut order = query.order_by.clone();
-    let mut plain = ColumnSimplifier { table: &source.name, alias: &alias, functions: Functions::default() };
-    let plainly = walk(&mut select.projection, &mut plain)
-        && walk(&mut select.selection, &mut plain)
-        && walk(&mut select.having, &mut plain)
-        && walk(&mut select.group_by, &mut plain)
-        && walk(&mut order, &mut plain);
-    let Functions { aggregates, others } = plain.functions;
-    if !plainly || others {
+    let mut plain = ColumnSimplifier { table: &source.name, alias: &alias, aggregates: false };
+    if !walk(&mut select, &mut plain) || !walk(&mut order, &mut plain) {
         return None;
     }
     let items = items(&select, source)?;
@@ -91,43 +91,23 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     if !modifiers.is_empty() {
         return None;
     }
-    let schema = source.files.as_ref()?.schema();
-    let conditions = of_where(select.selection.as_ref(), schema);
-    let table = source.name.clone();
-    let table_query = TableQuery { table, source, items, condition: select.selection, having: select.having, ordered };
-    let mut streaming = StreamPlan {
-        table: table_query.table.clone(),
-        partial: String::new(),
-        groups: None,
-        conditions: conditions.clone().unwrap_or_default(),
-        top: None,
-        merge: None,
-        finish: None,
-        keys,
-        offset,
-        limit,
-        names,
-    };
-    if groups.is_empty() && !aggregates {
-        if table_query.having.is_some() || !streaming.keys.is_empty() && limit.is_none() {
+    let conditions = of_where(select.selection.as_ref(), files.schema());
+    let condition = select.selection.map(|condition| condition.to_string());
+    let table_query = TableQuery { source, items, condition, having: select.having, ordered };
+    let (partial, groups, top) = if groups.is_empty() && !plain.aggregates {
+        if table_query.having.is_some() || !keys.is_empty() && limit.is_none() {
             return None;
         }
         let most = limit.map(|limit| limit.saturating_add(offset));
-        streaming.partial = table_query.rows(most);
-        streaming.top = conditions.and_then(|_| table_query.top(&streaming.keys, most?, schema));
+        let top = conditions.as_ref().and_then(|_| table_query.top(&keys, most?, &files));
+        (table_query.rows(most), None, top)
     } else {
-        let (partial, merge, finish, measured) = table_query.groups(groups)?;
-        streaming.groups = conditions.and_then(|conditions| counted(measured?, conditions, schema));
-        (streaming.partial, streaming.merge, streaming.finish) = (partial, Some(merge), Some(finish));
-    }
-    Some(streaming)
-}
-
-/// The aggregation of columns, if it suffices for the groups.
-fn counted((keys, aggregates): GroupedColumns, conditions: Vec<Condition>, schema: &Schema) -> Option<GroupQuery> {
-    let kinds = keys.into_iter().map(|key| Some((key.clone(), Kind::of(&key, schema)?)));
-    let groups = GroupQuery { conditions, keys: kinds.collect::<Option<_>>()?, aggregates };
-    groups.fits(schema).then_some(groups)
+        let (partial, groups) = table_query.groups(groups, &files)?;
+        let columns = groups.columns.filter(|_| conditions.is_some());
+        (partial, Some(GroupPlan { columns, ..groups }), None)
+    };
+    let (table, files) = (source.name.clone(), files.only(conditions.unwrap_or_default(), top));
+    Some(StreamPlan { files, table, partial, groups, keys, offset, limit, names })
 }
 
 /// Whether a query consists only of items, tables, WHERE, GROUP BY, HAVING, ORDER BY, LIMIT and OFFSET.
@@ -193,9 +173,8 @@ fn items(select: &Select, source: &Source) -> Option<Vec<(String, Expr)>> {
             _ => return None,
         }
     }
-    let mut names: Vec<&String> = items.iter().map(|(name, _)| name).collect();
-    names.sort();
-    let distinct = names.windows(2).all(|pair| pair[0] != pair[1]);
+    let mut names = HashSet::new();
+    let distinct = items.iter().all(|(name, _)| names.insert(name));
     (distinct && !items.is_empty()).then_some(items)
 }
 
@@ -207,137 +186,118 @@ fn quoted(name: &str) -> Expr {
 fn item(expression: &Expr, items: &[(String, Expr)]) -> Option<Expr> {
     let found = match expression {
         Expr::Identifier(name) => items.iter().find(|(known, _)| *known == name.value),
-        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => {
-            items.get(digits.parse::<usize>().ok()?.checked_sub(1)?)
-        }
-        _ => None,
+        place => items.get(whole_number(place)?.checked_sub(1)?),
     };
     found.map(|(_, expression)| expression.clone())
 }
 
 /// The numbers of `LIMIT` and `OFFSET`; `None` if they are not literals.
 fn limits(query: &Query) -> Option<(Option<usize>, usize)> {
-    let number = |expression: &Expr| match expression {
-        Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => digits.parse::<usize>().ok(),
-        _ => None,
-    };
     match &query.limit_clause {
         None => Some((None, 0)),
         Some(LimitClause::LimitOffset { limit, offset, limit_by }) if limit_by.is_empty() => {
-            let limit = limit.as_ref().map(|limit| number(limit).ok_or(())).transpose().ok()?;
-            Some((limit, offset.as_ref().map_or(Some(0), |offset| number(&offset.value))?))
+            let limit = match limit {
+                Some(limit) => Some(whole_number(limit)?),
+                None => None,
+            };
+            Some((limit, offset.as_ref().map_or(Some(0), |offset| whole_number(&offset.value))?))
         }
         Some(_) => None,
     }
 }
 
+/// The column that an expression is.
+fn column_name(expression: &Expr) -> Option<&str> {
+    match expression {
+        Expr::Identifier(name) => Some(&name.value),
+        _ => None,
+    }
+}
+
 /// A query on one table.
 struct TableQuery<'a> {
-    table: String,
     source: &'a Source,
     items: Vec<(String, Expr)>,
-    condition: Option<Expr>,
+    condition: Option<String>,
     having: Option<Expr>,
     ordered: Vec<Expr>,
 }
 
 impl TableQuery<'_> {
+    /// The columns of the answer, and those of its order.
+    fn columns(&self) -> impl Iterator<Item = (String, &Expr)> {
+        let keys = self.ordered.iter().enumerate().map(|(place, key)| (format!("__k{place}"), key));
+        self.items.iter().map(|(name, expression)| (name.clone(), expression)).chain(keys)
+    }
+
     /// The rows of a part that may be among the first `most`, if the first of `keys` is a column of numbers.
-    fn top(&self, keys: &[Key], most: usize, schema: &Schema) -> Option<Top> {
-        let (Expr::Identifier(column), Key { descending, nulls_last }) = (self.ordered.first()?, *keys.first()?) else {
-            return None;
-        };
-        let column = column.value.clone();
-        let is_number = Kind::of(&column, schema) == Some(Kind::Number);
-        is_number.then_some(Top { column, descending, nulls_last, most, is_only_key: keys.len() == 1 })
+    fn top(&self, keys: &[Key], most: usize, files: &Files) -> Option<Top> {
+        let (column, key) = (column_name(self.ordered.first()?)?.to_owned(), *keys.first()?);
+        let is_number = Kind::of(&column, files.schema()) == Some(Kind::Number);
+        is_number.then_some(Top { column, key, most, is_only_key: keys.len() == 1 })
     }
 
     /// The query for at most `most` rows of a part.
     fn rows(&self, most: Option<usize>) -> String {
-        let items = self.items.iter().map(|(name, expression)| aliased(expression, name));
-        let keys = self.ordered.iter().enumerate().map(|(place, key)| aliased(key, &format!("__k{place}")));
-        let mut sql = format!("SELECT {} FROM {}", joined(items.chain(keys)), quoted(&self.table));
-        if let Some(condition) = &self.condition {
-            sql.push_str(&format!(" WHERE {condition}"));
-        }
-        if self.ordered.is_empty()
-            && let Some(most) = most
-        {
-            sql.push_str(&format!(" LIMIT {most}"));
-        }
-        sql
+        let columns: Vec<String> = self.columns().map(|(name, expression)| aliased(expression, &name)).collect();
+        let most = most.filter(|_| self.ordered.is_empty()).map(|most| most.to_string());
+        sql(&columns, &self.source.name, &[("WHERE", self.condition.as_slice()), ("LIMIT", most.as_slice())])
     }
 
-    /// The queries for the groups of a part, for merging them, and for the final answer.
-    fn groups(&self, groups: Vec<Expr>) -> Option<(String, String, String, Option<GroupedColumns>)> {
-        let mut keys = Vec::new();
-        for group in groups {
-            let is_column = matches!(&group, Expr::Identifier(name) if self.source.columns.contains(&name.value));
-            keys.push(if is_column { group } else { item(&group, &self.items).unwrap_or(group) });
-        }
-        let mut lift = AggregateExtractor { keys: &keys, partial: Vec::new(), aggregates: Vec::new() };
+    /// The query for the groups of a part, and the plan that computes the answer from them.
+    fn groups(&self, groups: Vec<Expr>, files: &Files) -> Option<(String, GroupPlan)> {
+        let is_column = |group: &Expr| column_name(group).is_some_and(|name| files.schema().contains(name));
+        let key = |group: Expr| if is_column(&group) { group } else { item(&group, &self.items).unwrap_or(group) };
+        let keys: Vec<Expr> = groups.into_iter().map(key).collect();
+        let mut lift = AggregateExtractor { keys: &keys, aggregates: Vec::new() };
         let mut columns = Vec::new();
-        for (name, expression) in &self.items {
-            columns.push(aliased(&lift.lifted(expression)?, name));
-        }
-        for (place, key) in self.ordered.iter().enumerate() {
-            columns.push(aliased(&lift.lifted(key)?, &format!("__k{place}")));
+        for (name, expression) in self.columns() {
+            columns.push(aliased(&lift.lifted(expression)?, &name));
         }
         let having = match &self.having {
-            Some(having) => format!(" WHERE {}", lift.lifted(having)?),
-            None => String::new(),
+            Some(having) => Some(lift.lifted(having)?.to_string()),
+            None => None,
         };
-        let names: Vec<String> = (0..keys.len()).map(|place| format!("__g{place}")).collect();
-        let mut finish = format!("SELECT {} FROM {}{having}", joined(columns.into_iter()), quoted(PARTS));
-        if self.ordered.is_empty() && !keys.is_empty() {
-            // Otherwise two runs would print the groups in different orders.
-            finish.push_str(&format!(" ORDER BY {}", joined(names.iter().map(|name| format!("\"{name}\"")))));
+        let aggregates = lift.aggregates;
+
+        let names: Vec<String> = (0..keys.len()).map(|place| quoted(&format!("__g{place}")).to_string()).collect();
+        let mut found: Vec<String> = keys.iter().zip(&names).map(|(key, name)| format!("{key} AS {name}")).collect();
+        let mut merged = names.clone();
+        for (place, aggregate) in aggregates.iter().enumerate() {
+            let name = quoted(&format!("__a{place}"));
+            found.push(format!("{} AS {name}", aggregate.sql()));
+            merged.push(format!("{}({name}) AS {name}", aggregate.measure.merged_by()));
         }
-        let key_columns = keys.iter().zip(&names).map(|(key, name)| aliased(key, name));
-        let parts = lift.partial.iter().enumerate().map(|(place, (sql, _))| format!("{sql} AS \"__a{place}\""));
-        let merged = lift
-            .partial
-            .iter()
-            .enumerate()
-            .map(|(place, (_, merge))| format!("{merge}(\"__a{place}\") AS \"__a{place}\""));
-        let mut partial = format!("SELECT {} FROM {}", joined(key_columns.chain(parts)), quoted(&self.table));
-        if let Some(condition) = &self.condition {
-            partial.push_str(&format!(" WHERE {condition}"));
-        }
-        let quoted_names = || names.iter().map(|name| format!("\"{name}\""));
-        let mut merge = format!("SELECT {} FROM {}", joined(quoted_names().chain(merged)), quoted(PARTS));
-        if !keys.is_empty() {
-            partial.push_str(&format!(" GROUP BY {}", joined(keys.iter().map(ToString::to_string))));
-            merge.push_str(&format!(" GROUP BY {}", joined(quoted_names())));
-        }
-        let plain = |key: &Expr| match key {
-            Expr::Identifier(name) => Some(name.value.clone()),
-            _ => None,
-        };
-        let measured = keys.iter().map(plain).collect::<Option<Vec<_>>>();
-        let measured = measured.zip(lift.aggregates.into_iter().collect::<Option<Vec<_>>>());
-        Some((partial, merge, finish, measured))
+        let grouped: Vec<String> = keys.iter().map(ToString::to_string).collect();
+        let partial = [("WHERE", self.condition.as_slice()), ("GROUP BY", &grouped)];
+        // Without an order, two runs would print the groups in different orders.
+        let order = if self.ordered.is_empty() { names.as_slice() } else { &[] };
+        let finish = sql(&columns, PARTS, &[("WHERE", having.as_slice()), ("ORDER BY", order)]);
+        let merge = sql(&merged, PARTS, &[("GROUP BY", &names)]);
+        let plain = keys.iter().map(|key| column_name(key).map(str::to_owned)).collect::<Option<Vec<_>>>();
+        let columns = plain.and_then(|keys| GroupQuery::new(keys, aggregates, files.schema()));
+        Some((sql(&found, &self.source.name, &partial), GroupPlan { columns, merge, finish }))
     }
 }
 
-/// The key columns of the groups, and the aggregates.
-type GroupedColumns = (Vec<String>, Vec<Aggregate>);
+/// A SELECT of `columns` from a table, with those clauses that have terms.
+fn sql(columns: &[String], table: &str, clauses: &[(&str, &[String])]) -> String {
+    let mut sql = format!("SELECT {} FROM {}", columns.join(", "), quoted(table));
+    for (keyword, terms) in clauses.iter().filter(|(_, terms)| !terms.is_empty()) {
+        sql.push_str(&format!(" {keyword} {}", terms.join(", ")));
+    }
+    sql
+}
 
 fn aliased(expression: &Expr, name: &str) -> String {
     format!("{expression} AS {}", quoted(name))
 }
 
-fn joined(parts: impl Iterator<Item = String>) -> String {
-    parts.collect::<Vec<_>>().join(", ")
-}
-
 /// Extracts the groups and their sums, counts and extremes from expressions.
 struct AggregateExtractor<'a> {
     keys: &'a [Expr],
-    /// Aggregates of a part, each with the function that merges it.
-    partial: Vec<(String, &'static str)>,
-    /// The aggregates of columns, if they have this form.
-    aggregates: Vec<Option<Aggregate>>,
+    /// The aggregates of a part, in the columns `__a0`, `__a1`, ...
+    aggregates: Vec<Aggregate>,
 }
 
 impl AggregateExtractor<'_> {
@@ -347,13 +307,13 @@ impl AggregateExtractor<'_> {
         walk(&mut expression, self).then_some(expression)
     }
 
-    /// The column of partial answers with `sql`.
-    fn column(&mut self, sql: String, merge: &'static str, aggregate: Option<Aggregate>) -> Expr {
-        let known = self.partial.iter().position(|(other, by)| *other == sql && *by == merge);
-        let place = known.unwrap_or_else(|| {
-            self.partial.push((sql, merge));
+    /// The column of partial answers with this aggregate.
+    fn column(&mut self, measure: Measure, argument: &str, column: Option<&str>) -> Expr {
+        let (argument, column) = (argument.to_owned(), column.map(str::to_owned));
+        let aggregate = Aggregate { measure, argument, column };
+        let place = self.aggregates.iter().position(|known| *known == aggregate).unwrap_or_else(|| {
             self.aggregates.push(aggregate);
-            self.partial.len() - 1
+            self.aggregates.len() - 1
         });
         quoted(&format!("__a{place}"))
     }
@@ -362,29 +322,22 @@ impl AggregateExtractor<'_> {
         let called = function.name.to_string().to_lowercase();
         let FunctionArguments::List(list) = &function.args else { return None };
         let (argument, column) = match list.args.as_slice() {
-            [FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))] => match argument {
-                Expr::Identifier(name) => (argument.to_string(), Some(name.value.clone())),
-                _ => (argument.to_string(), None),
-            },
+            [FunctionArg::Unnamed(FunctionArgExpr::Expr(argument))] => (argument.to_string(), column_name(argument)),
             [FunctionArg::Unnamed(FunctionArgExpr::Wildcard)] if called == "count" => ("*".to_owned(), None),
             _ => return None,
         };
-        let counted = if argument == "*" { Some(Aggregate::Rows) } else { column.clone().map(Aggregate::Count) };
-        let count = format!("CAST(count({argument}) AS BIGINT)");
         Some(match called.as_str() {
-            "min" => self.column(format!("min({argument})"), "min", column.map(Aggregate::Least)),
-            "max" => self.column(format!("max({argument})"), "max", column.map(Aggregate::Greatest)),
-            "sum" => self.column(format!("sum({argument})"), "sum", column.map(Aggregate::Sum)),
-            "count" => self.column(count, "sum", counted),
+            "min" => self.column(Measure::Least, &argument, column),
+            "max" => self.column(Measure::Greatest, &argument, column),
+            "sum" => self.column(Measure::Sum, &argument, column),
+            "count" => self.column(Measure::Count, &argument, column),
             _ => {
-                let sum = self.column(format!("sum(CAST({argument} AS DOUBLE))"), "sum", column.map(Aggregate::Sum));
-                let count = self.column(count, "sum", counted);
-                let count = cast(count, DataType::Double(sqlparser::ast::ExactNumberInfo::None));
-                let binary = |left, op, right| Expr::BinaryOp { left: Box::new(left), op, right: Box::new(right) };
+                let sum = self.column(Measure::Sum, &format!("CAST({argument} AS DOUBLE)"), column);
+                let count = self.column(Measure::Count, &argument, column);
+                let count = cast(count, DataType::Double(ExactNumberInfo::None));
                 // The mean of no values is null, not 0/0.
-                let zero = Expr::value(Value::Number("0.0".to_owned(), false));
-                let some = binary(count.clone(), BinaryOperator::Gt, zero);
-                if_else_null(some, binary(sum, BinaryOperator::Divide, count))
+                let some = binary(count.clone(), BinaryOperator::Gt, number("0.0"));
+                case(some, binary(sum, BinaryOperator::Divide, count), None)
             }
         })
     }
@@ -411,19 +364,11 @@ impl Visit for AggregateExtractor<'_> {
     }
 }
 
-/// The functions that a query calls.
-#[derive(Default)]
-struct Functions {
-    aggregates: bool,
-    /// Whether it calls functions that need all rows at once, or unknown functions.
-    others: bool,
-}
-
-/// Removes the name of the table from columns, and finds expressions that need all rows at once.
+/// Removes the name of the table from columns, and finds aggregates. Ends at an expression that may need all rows at once.
 struct ColumnSimplifier<'a> {
     table: &'a str,
     alias: &'a str,
-    functions: Functions,
+    aggregates: bool,
 }
 
 impl Visit for ColumnSimplifier<'_> {
@@ -449,8 +394,10 @@ impl Visit for ColumnSimplifier<'_> {
                     _ => false,
                 };
                 let aggregate = is_one_of(MERGED_FUNCTIONS, function);
-                self.functions.aggregates |= aggregate;
-                self.functions.others |= !bare || !list || !aggregate && !is_one_of(SCALAR_FUNCTIONS, function);
+                self.aggregates |= aggregate;
+                if !bare || !list || !aggregate && !is_one_of(SCALAR_FUNCTIONS, function) {
+                    return ControlFlow::Break(());
+                }
             }
             _ => {}
         }
