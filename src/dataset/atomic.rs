@@ -10,33 +10,20 @@ use std::time::{Duration, Instant, SystemTime};
 
 use tempfile::NamedTempFile;
 
+use super::folder::{DatasetError, failed};
+
 /// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Chosen: writing one takes seconds, and a day covers wrong clocks.
 const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
-
-/// A step that failed, and why.
-#[derive(Debug)]
-pub struct Unwritten {
-    /// The attempted action.
-    pub action: &'static str,
-    /// The cause.
-    pub source: io::Error,
-}
-
-impl Unwritten {
-    fn at(action: &'static str) -> impl Fn(io::Error) -> Unwritten {
-        move |source| Unwritten { action, source }
-    }
-}
 
 /// Writes `bytes` to `path`. An incomplete file never has this name, even after a power cut.
 ///
 /// # Errors
 ///
 /// A file that cannot be written.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
     let temporary = filled(path, bytes)?;
-    temporary.persist(path).map_err(|error| Unwritten::at(RENAME)(error.error))?;
-    sync_folder(folder_of(path)).map_err(Unwritten::at("sync the folder"))
+    temporary.persist(path).map_err(|error| failed(path, RENAME, error.error))?;
+    sync_folder_of(path)
 }
 
 /// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
@@ -44,13 +31,12 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Unwritten> {
 /// # Errors
 ///
 /// A file that cannot be written.
-pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Unwritten> {
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, DatasetError> {
     match filled(path, bytes)?.persist_noclobber(path) {
-        Err(error) if path.exists() => drop(error),
-        Err(error) => return Err(Unwritten::at(RENAME)(error.error)),
-        Ok(_) => return sync_folder(folder_of(path)).map(|()| true).map_err(Unwritten::at("sync the folder")),
+        Ok(_) => sync_folder_of(path).map(|()| true),
+        Err(_) if path.exists() => Ok(false),
+        Err(error) => Err(failed(path, RENAME, error.error)),
     }
-    Ok(false)
 }
 
 /// Writes a file durably; `fill` writes the content.
@@ -70,11 +56,15 @@ pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) 
 const RENAME: &str = "rename the temporary file";
 
 /// A temporary file for `path` with these bytes, on the disk.
-fn filled(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, Unwritten> {
-    let mut temporary = create(path).map_err(Unwritten::at("create"))?;
-    temporary.as_file_mut().write_all(bytes).map_err(Unwritten::at("write"))?;
-    temporary.as_file().sync_all().map_err(Unwritten::at("sync"))?;
+fn filled(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, DatasetError> {
+    let mut temporary = create(path).map_err(|error| failed(path, "create", error))?;
+    temporary.as_file_mut().write_all(bytes).map_err(|error| failed(path, "write", error))?;
+    temporary.as_file().sync_all().map_err(|error| failed(path, "sync", error))?;
     Ok(temporary)
+}
+
+fn sync_folder_of(path: &Path) -> Result<(), DatasetError> {
+    sync_folder(folder_of(path)).map_err(|error| failed(path, "sync the folder", error))
 }
 
 /// The folder of a file.
@@ -163,14 +153,12 @@ pub fn nearest_folder(folder: &Path) -> PathBuf {
 /// # Errors
 ///
 /// A file that cannot be written.
-pub fn time(folder: &Path, bytes: usize) -> io::Result<Duration> {
-    let folder = nearest_folder(folder);
+pub fn time(folder: &Path, bytes: usize) -> Result<Duration, DatasetError> {
+    let path = nearest_folder(folder).join("plan");
     let content = vec![0; bytes];
     let start = Instant::now();
-    let mut temporary = create(&folder.join("plan"))?;
-    temporary.as_file_mut().write_all(&content)?;
-    temporary.as_file().sync_all()?;
-    sync_folder(&folder)?;
+    let _temporary = filled(&path, &content)?;
+    sync_folder_of(&path)?;
     Ok(start.elapsed())
 }
 

@@ -1,11 +1,14 @@
-//! A cell of a table, for display and for footers.
+//! Cells of a table, for display and for footers.
 
 use std::borrow::Cow;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{Float64Type, Int32Type};
-use arrow_array::{Array, RecordBatch};
+use arrow_array::{Array, ArrayRef, RecordBatch};
+use arrow_schema::DataType;
 use serde::{Deserialize, Serialize};
+
+use super::layout::label;
 
 /// A cell. In JSON it is `null`, a number as text (which preserves every bit and infinity), or a list of one word.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,22 +37,82 @@ impl Cell {
     }
 }
 
+/// The cells of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cells {
+    /// Numbers; NaN for null.
+    Numbers(Vec<f64>),
+    /// Indices into a list of words; `None` for null.
+    Words(Vec<Option<u32>>, Vec<String>),
+}
+
+impl Cells {
+    /// An empty column of this type; `None` for a type that no table has.
+    pub(super) fn none(kind: &DataType) -> Option<Cells> {
+        match kind {
+            DataType::Float64 => Some(Cells::Numbers(Vec::new())),
+            DataType::Boolean => Some(Cells::Words(Vec::new(), ["no", "yes"].map(str::to_owned).into())),
+            kind if *kind == label() => Some(Cells::Words(Vec::new(), Vec::new())),
+            _ => None,
+        }
+    }
+
+    /// Appends an array of the same type.
+    pub(super) fn extend(&mut self, array: &dyn Array) {
+        match self {
+            Cells::Numbers(numbers) => {
+                let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
+                match array.null_count() {
+                    0 => numbers.extend_from_slice(array.values()),
+                    _ => numbers.extend(array.iter().map(|cell| cell.unwrap_or(f64::NAN))),
+                }
+            }
+            Cells::Words(places, words) => {
+                if let Some(flags) = array.as_boolean_opt() {
+                    places.extend(flags.iter().map(|flag| flag.map(u32::from)));
+                } else if let Some(array) = array.as_dictionary_opt::<Int32Type>()
+                    && let Some(values) = array.values().as_string_opt::<i32>()
+                {
+                    // The indices of the words of the array among the words of the column.
+                    let here: Vec<u32> = values.iter().map(|word| place(words, word.unwrap_or_default())).collect();
+                    let cell = |key: i32| here.get(usize::try_from(key).ok()?).copied();
+                    places.extend(array.keys().iter().map(|key| cell(key?)));
+                }
+            }
+        }
+    }
+
+    /// The cell of a row.
+    pub(super) fn cell(&self, row: usize) -> Cell {
+        match self {
+            Cells::Numbers(numbers) => {
+                numbers.get(row).filter(|number| !number.is_nan()).map_or(Cell::Missing, |number| Cell::Number(*number))
+            }
+            Cells::Words(places, words) => {
+                let word = places.get(row).copied().flatten().and_then(|place| words.get(place as usize));
+                word.map_or(Cell::Missing, |word| Cell::Word(word.clone()))
+            }
+        }
+    }
+}
+
+/// The index of a word, which is added if it is new.
+fn place(words: &mut Vec<String>, word: &str) -> u32 {
+    let found = words.iter().position(|known| known == word);
+    found.unwrap_or_else(|| {
+        words.push(word.to_owned());
+        words.len() - 1
+    }) as u32
+}
+
 /// The cells of the first row of `batch`.
 pub fn first_row(batch: &RecordBatch) -> Vec<Cell> {
-    let cell = |array: &dyn Array| {
-        if array.is_empty() || array.is_null(0) {
-            None
-        } else if let Some(numbers) = array.as_primitive_opt::<Float64Type>() {
-            Some(Cell::Number(numbers.value(0)))
-        } else if let Some(flags) = array.as_boolean_opt() {
-            Some(Cell::Word(if flags.value(0) { "yes" } else { "no" }.to_owned()))
-        } else {
-            let words = array.as_dictionary_opt::<Int32Type>()?;
-            let word = words.values().as_string_opt::<i32>()?.value(words.key(0)?);
-            Some(Cell::Word(word.to_owned()))
-        }
+    let first = |array: &ArrayRef| {
+        let mut cells = Cells::none(array.data_type())?;
+        cells.extend(array);
+        Some(cells.cell(0))
     };
-    batch.columns().iter().map(|array| cell(array).unwrap_or(Cell::Missing)).collect()
+    batch.columns().iter().map(|array| first(array).unwrap_or(Cell::Missing)).collect()
 }
 
 /// A number as text: the shortest text that determines the double.

@@ -10,7 +10,7 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::reader::ChunkReader;
 use sha2::{Digest, Sha256};
 
-use super::metadata_limits::page_headers;
+use super::metadata_limits::{TRAILER, footer_place, page_headers};
 
 /// The key of the checksum of footer and headers.
 const HEAD_KEY: &str = "slipsweep.head_sha256";
@@ -23,9 +23,6 @@ const BLANK: &str = "00000000000000000000000000000000000000000000000000000000000
 
 /// Bytes of Thrift's compact protocol between key and value: the header of the next field, a string, and its length.
 const KEY_VALUE_SEPARATOR: [u8; 2] = [0x18, BLANK.len() as u8];
-
-/// Bytes after the footer: its length and `PAR1`.
-const TRAILER: u64 = 8;
 
 /// The entries of a footer that hold the checksums; they must be its last entries.
 pub fn entries() -> [KeyValue; 2] {
@@ -76,11 +73,9 @@ pub fn is_head_intact(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Re
 
 /// The bytes of the footer with its length and `PAR1`.
 fn footer(file: &impl ChunkReader) -> Result<Vec<u8>> {
-    let before = file.len().saturating_sub(TRAILER);
-    let trailer = file.get_bytes(before, TRAILER as usize)?;
-    let length = trailer.iter().take(4).rev().fold(0_u64, |length, &byte| length << 8 | u64::from(byte));
-    let start = before.checked_sub(length).ok_or_else(|| ParquetError::General("its footer is damaged".to_owned()))?;
-    Ok(file.get_bytes(start, (length + TRAILER) as usize)?.to_vec())
+    let place = footer_place(file)?;
+    let (start, length) = place.ok_or_else(|| ParquetError::General("its footer is damaged".to_owned()))?;
+    Ok(file.get_bytes(start, length + TRAILER as usize)?.to_vec())
 }
 
 /// The checksum of the page headers, in order, and of the footer.
@@ -111,6 +106,7 @@ fn whole(bytes: &[u8], place: usize) -> String {
     digits(hash.chain_update(&bytes[place + BLANK.len()..]))
 }
 
-fn digits(hash: Sha256) -> String {
+/// A checksum in hexadecimal digits.
+pub fn digits(hash: Sha256) -> String {
     hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -19,6 +19,14 @@ use super::rle;
 /// Runs of equal codes: code and number of rows.
 pub type Runs = Vec<(u32, usize)>;
 
+/// Appends a run, or continues the last one with an equal code.
+pub fn push(runs: &mut Runs, code: u32, rows: usize) {
+    match runs.last_mut() {
+        Some((last, total)) if *last == code => *total += rows,
+        _ => runs.push((code, rows)),
+    }
+}
+
 /// Least size of a compressed page, in bytes. Chosen: smaller pages cost more time than they save space.
 const MIN_COMPRESSED_BYTES: usize = 1 << 12;
 
@@ -150,13 +158,8 @@ fn add_page(
     Ok(header + size)
 }
 
-/// Appends the next field of a struct: a 32-bit number with the sign in the lowest bit, in groups of seven bits, the lowest first.
+/// Appends the next field of a struct: a 32-bit number with the sign in the lowest bit.
 fn add_field(file: &mut Vec<u8>, value: i32) {
     file.push(0x15);
-    let mut left = (value << 1 ^ value >> 31).cast_unsigned();
-    while left >= 0x80 {
-        file.push(left as u8 | 0x80);
-        left >>= 7;
-    }
-    file.push(left as u8);
+    rle::varint(file, (value << 1 ^ value >> 31).cast_unsigned().into());
 }

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::atomic::{self, Unwritten};
-use super::footer::Footer;
+use super::atomic;
 use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, State};
 
@@ -161,7 +160,7 @@ impl Folder {
         let first = |table: PathBuf| sorted(&table, is_part).into_iter().find_map(|part| state::footer_of(&part));
         let footers = sorted(&self.path, Path::is_dir).into_iter().filter_map(first);
         // Tables are only added, so the manifest with the most tables is the last one.
-        footers.map(Footer::manifest).reduce(|most, next| if next.covers(&most) { next } else { most })
+        footers.map(|footer| footer.manifest).reduce(|most, next| if next.covers(&most) { next } else { most })
     }
 
     /// Whether any file has the name of a part.
@@ -172,14 +171,9 @@ impl Folder {
     /// Checks that a run of `expected` may write to the dataset of `found`.
     pub(super) fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
         let folder = self.path.display().to_string();
-        let (here, there) = (&expected.build, &found.build);
-        for (what, here, there) in
-            [("version", &here.version, &there.version), ("numerics revision", &here.revision, &there.revision)]
-        {
-            if here != there {
-                let expected = format!("{here}, of this program");
-                return Err(DatasetError::Foreign { folder, what, expected, found: there.clone() });
-            }
+        if let Some((what, here, there)) = expected.build.difference(&found.build) {
+            let expected = format!("{here}, of this program");
+            return Err(DatasetError::Foreign { folder, what, expected, found: there.to_owned() });
         }
         for table in &expected.tables {
             if let Some(other) = found.table(&table.name)
@@ -269,16 +263,15 @@ impl Folder {
     ///
     /// A file that cannot be written.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
-        let path = self.part(table, part);
-        atomic::write(&path, bytes).map_err(|error| unwritten(&path, error))
+        atomic::write(&self.part(table, part), bytes)
     }
 
-    /// Files below the folder that do not belong to the dataset of `manifest`, and whether they are temporary files of a run.
-    pub fn strays(&self, manifest: &Manifest) -> Vec<(PathBuf, bool)> {
+    /// Files below the folder that do not belong to the dataset of `manifest`: temporary files of a run, and others.
+    pub fn strays(&self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<PathBuf>) {
         let mut strays = Vec::new();
         for path in sorted(&self.path, |_| true) {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            match manifest.tables.iter().find(|table| table.name == name) {
+            match manifest.table(&name) {
                 Some(table) if path.is_dir() => {
                     strays.extend(sorted(&path, |path| self.part_at(table, path).is_none()));
                 }
@@ -286,8 +279,9 @@ impl Folder {
                 _ => strays.push(path),
             }
         }
-        let is_temporary = |path: &Path| atomic::is_temporary(&path.file_name().unwrap_or_default().to_string_lossy());
-        strays.into_iter().map(|path| (is_temporary(&path), path)).map(|(temporary, path)| (path, temporary)).collect()
+        let is_temporary =
+            |path: &PathBuf| atomic::is_temporary(&path.file_name().unwrap_or_default().to_string_lossy());
+        strays.into_iter().partition(is_temporary)
     }
 
     /// The number of the part of `table` with this `path`.
@@ -312,10 +306,7 @@ fn is_part(path: &Path) -> bool {
     name.starts_with("part-") && name.ends_with(".parquet")
 }
 
-pub(super) fn unwritten(path: &Path, Unwritten { action, source }: Unwritten) -> DatasetError {
-    failed(path, action, source)
-}
-
+/// The error that `path` cannot be created, read or written.
 pub(super) fn failed(path: &Path, action: &'static str, source: io::Error) -> DatasetError {
     DatasetError::Io { path: path.display().to_string(), action, source }
 }

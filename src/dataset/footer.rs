@@ -17,14 +17,8 @@ const MAX_SPEC_BYTES: usize = 1 << 16;
 /// The origin of a part. Every part describes the whole dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Footer {
-    /// The name of the dataset.
-    pub name: String,
-    /// The text of the spec, if it is short.
-    pub spec: Option<String>,
-    /// The program.
-    pub build: Build,
-    /// All tables of the dataset.
-    pub tables: Vec<ManifestTable>,
+    /// The manifest of the dataset; read from a part, its spec is empty if it is too long for a footer.
+    pub manifest: Manifest,
     /// The table.
     pub table: String,
     /// The rows, by global number.
@@ -52,25 +46,19 @@ pub type StatusCounts = [u64; Status::ALL.len()];
 impl Footer {
     /// The footer of `rows` of `table` in the dataset of `manifest`.
     pub fn new(manifest: &Manifest, table: &str, rows: Range<u64>) -> Footer {
-        Footer {
-            name: manifest.name.clone(),
-            spec: Some(manifest.spec.clone()).filter(|spec| spec.len() <= MAX_SPEC_BYTES),
-            build: manifest.build.clone(),
-            tables: manifest.tables.clone(),
-            table: table.to_owned(),
-            rows,
-        }
+        Footer { manifest: manifest.clone(), table: table.to_owned(), rows }
     }
 
     /// The footer as Parquet metadata, with the statistics of the rows. The entries of the checksums follow.
     pub fn entries(&self, statistics: &TableStatistics) -> Vec<KeyValue> {
         let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(statistics.status).collect();
         let counts = serde_json::to_string(&counts).unwrap_or_default();
-        let tables = serde_json::to_string(&self.tables).unwrap_or_default();
+        let Manifest { name, build, tables, spec, .. } = &self.manifest;
+        let tables = serde_json::to_string(tables).unwrap_or_default();
         let entries = [
-            (NAME, self.name.clone()),
-            (VERSION, self.build.version.clone()),
-            (REVISION, self.build.revision.clone()),
+            (NAME, name.clone()),
+            (VERSION, build.version.clone()),
+            (REVISION, build.revision.clone()),
             (TABLES, tables),
             (TABLE, self.table.clone()),
             (HASH, self.planned().map_or_else(String::new, |table| table.hash.clone())),
@@ -79,22 +67,22 @@ impl Footer {
             (STATUS, counts),
             (STATISTICS, serde_json::to_string(statistics).unwrap_or_default()),
         ];
-        let spec = self.spec.iter().map(|spec| (SPEC, spec.clone()));
-        let entries = spec.chain(entries).map(|(key, value)| KeyValue::new(key.to_owned(), value));
+        let spec = (spec.len() <= MAX_SPEC_BYTES).then(|| (SPEC, spec.clone()));
+        let entries = spec.into_iter().chain(entries).map(|(key, value)| KeyValue::new(key.to_owned(), value));
         entries.chain(checksum::entries()).collect()
     }
 
     /// Reads the footer from Parquet metadata; `None` if an entry is missing.
     pub fn from_entries(entries: &[KeyValue]) -> Option<Footer> {
         let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.clone();
-        Some(Footer {
+        let manifest = Manifest {
             name: get(NAME)?,
-            spec: get(SPEC),
             build: Build { version: get(VERSION)?, revision: get(REVISION)? },
             tables: serde_json::from_str(&get(TABLES)?).ok()?,
-            table: get(TABLE)?,
-            rows: get(ROW_START)?.parse().ok()?..get(ROW_END)?.parse().ok()?,
-        })
+            spec: get(SPEC).unwrap_or_default(),
+            rebuilt: None,
+        };
+        Some(Footer { manifest, table: get(TABLE)?, rows: get(ROW_START)?.parse().ok()?..get(ROW_END)?.parse().ok()? })
     }
 
     /// The statistics of the rows of the part, from its Parquet metadata.
@@ -109,12 +97,6 @@ impl Footer {
 
     /// Its table in the manifest of the dataset.
     pub fn planned(&self) -> Option<&ManifestTable> {
-        self.tables.iter().find(|table| table.name == self.table)
-    }
-
-    /// The manifest of the dataset of the part.
-    pub fn manifest(self) -> Manifest {
-        let spec = self.spec.unwrap_or_default();
-        Manifest { name: self.name, build: self.build, tables: self.tables, spec, rebuilt: None }
+        self.manifest.table(&self.table)
     }
 }

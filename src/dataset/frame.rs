@@ -2,20 +2,18 @@
 
 use std::path::Path;
 
-use arrow_array::cast::AsArray;
-use arrow_array::types::{Float64Type, Int32Type};
-use arrow_array::{Array, RecordBatchReader};
-use arrow_schema::DataType;
+use arrow_array::RecordBatchReader;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::statistics::Statistics;
 
+pub use super::cell::Cells;
+
 use super::cell::Cell;
 use super::folder::DatasetError;
 use super::guard::guarded;
-use super::layout::label;
 use super::metadata_limits::{self, coded};
 use crate::file;
 
@@ -35,15 +33,6 @@ pub struct Heading {
     pub is_number: bool,
 }
 
-/// The cells of a column.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Cells {
-    /// Numbers; NaN for null.
-    Numbers(Vec<f64>),
-    /// Indices into a list of words; `None` for null.
-    Words(Vec<Option<u32>>, Vec<String>),
-}
-
 /// Some columns of some rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
@@ -55,64 +44,6 @@ pub struct Frame {
 
 /// One row: names and values of its cells.
 pub type Row = Vec<(String, Cell)>;
-
-impl Cells {
-    /// An empty column of this type; `None` for a type that no table has.
-    fn none(kind: &DataType) -> Option<Cells> {
-        match kind {
-            DataType::Float64 => Some(Cells::Numbers(Vec::new())),
-            DataType::Boolean => Some(Cells::Words(Vec::new(), ["no", "yes"].map(str::to_owned).into())),
-            kind if *kind == label() => Some(Cells::Words(Vec::new(), Vec::new())),
-            _ => None,
-        }
-    }
-
-    /// Appends an array of the same type.
-    fn extend(&mut self, array: &dyn Array) {
-        match self {
-            Cells::Numbers(numbers) => {
-                let Some(array) = array.as_primitive_opt::<Float64Type>() else { return };
-                match array.null_count() {
-                    0 => numbers.extend_from_slice(array.values()),
-                    _ => numbers.extend(array.iter().map(|cell| cell.unwrap_or(f64::NAN))),
-                }
-            }
-            Cells::Words(places, words) => {
-                if let Some(flags) = array.as_boolean_opt() {
-                    places.extend(flags.iter().map(|flag| flag.map(u32::from)));
-                } else if let Some(array) = array.as_dictionary_opt::<Int32Type>()
-                    && let Some(values) = array.values().as_string_opt::<i32>()
-                {
-                    // The indices of the words of the array among the words of the column.
-                    let here: Vec<u32> = values.iter().map(|word| place(words, word.unwrap_or_default())).collect();
-                    let cell = |key: i32| here.get(usize::try_from(key).ok()?).copied();
-                    places.extend(array.keys().iter().map(|key| cell(key?)));
-                }
-            }
-        }
-    }
-
-    fn cell(&self, row: usize) -> Cell {
-        match self {
-            Cells::Numbers(numbers) => {
-                numbers.get(row).filter(|number| !number.is_nan()).map_or(Cell::Missing, |number| Cell::Number(*number))
-            }
-            Cells::Words(places, words) => {
-                let word = places.get(row).copied().flatten().and_then(|place| words.get(place as usize));
-                word.map_or(Cell::Missing, |word| Cell::Word(word.clone()))
-            }
-        }
-    }
-}
-
-/// The index of a word, which is added if it is new.
-fn place(words: &mut Vec<String>, word: &str) -> u32 {
-    let found = words.iter().position(|known| known == word);
-    found.unwrap_or_else(|| {
-        words.push(word.to_owned());
-        words.len() - 1
-    }) as u32
-}
 
 impl Frame {
     /// The cells of a column; `None` if it was not requested.
@@ -126,13 +57,13 @@ impl Frame {
     }
 }
 
-/// The error of reading columns.
+/// The error of reading columns: a file is damaged or not a Parquet file.
 #[derive(Debug, thiserror::Error)]
+#[error("{path}: cannot be read as Parquet: {reason}")]
 #[allow(missing_docs)]
-pub enum FrameError {
-    /// A file is damaged or not a Parquet file.
-    #[error("{path}: cannot be read as Parquet: {reason}")]
-    File { path: String, reason: String },
+pub struct FrameError {
+    pub path: String,
+    pub reason: String,
 }
 
 /// The error of reading a part.
@@ -147,7 +78,7 @@ pub enum ReadError {
 }
 
 fn wrong(path: &Path, reason: impl std::fmt::Display) -> FrameError {
-    FrameError::File { path: path.display().to_string(), reason: reason.to_string() }
+    FrameError { path: path.display().to_string(), reason: reason.to_string() }
 }
 
 /// The entries of a footer: keys and values.

@@ -5,6 +5,8 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::checksum::digits;
+
 /// The build of the program that computes a dataset. Different builds never write to the same dataset.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Build {
@@ -18,6 +20,14 @@ impl Build {
     /// This program.
     pub fn this() -> Build {
         Build { version: env!("CARGO_PKG_VERSION").to_owned(), revision: env!("SLIPSWEEP_REVISION").to_owned() }
+    }
+
+    /// The first property in which another build differs: its name, and both values.
+    pub(super) fn difference<'a>(&'a self, other: &'a Build) -> Option<(&'static str, &'a str, &'a str)> {
+        let properties =
+            [("version", &self.version, &other.version), ("numerics revision", &self.revision, &other.revision)];
+        let differing = properties.into_iter().find(|(_, own, other)| own != other);
+        differing.map(|(what, own, other)| (what, own.as_str(), other.as_str()))
     }
 }
 
@@ -77,7 +87,7 @@ impl Manifest {
     /// The bytes of the file, which depend on the manifest alone. The last entry is the SHA-256 of the other text.
     pub(super) fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
         let mut text = serde_json::to_vec_pretty(self)?;
-        let checksum: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+        let checksum = digits(Sha256::new().chain_update(&text));
         text.truncate(text.len() - "\n}".len());
         text.extend(format!(",\n  \"sha256\": \"{checksum}\"\n}}\n").into_bytes());
         Ok(text)

@@ -17,6 +17,8 @@ use super::guard::guarded;
 use super::layout::label;
 use super::thrift::{FILE_METADATA, PAGE_HEADER, walk};
 
+/// Bytes after the footer: its length and `PAR1`.
+pub const TRAILER: u64 = 8;
 /// Greatest size of a footer, in bytes. Chosen: hundreds of times that of our parts.
 const MAX_FOOTER_BYTES: usize = 1 << 24;
 /// Greatest size of a page header, in bytes. Chosen: hundreds of times that of our pages.
@@ -52,18 +54,26 @@ pub fn footer(file: &impl ChunkReader) -> Result<ParquetMetaData, ParquetError> 
     guarded(|| ParquetMetaDataReader::new().parse_and_finish(file)).unwrap_or_else(|| Err(damaged("footer")))
 }
 
+/// The start and the length of the footer; `None` if the file does not end like a Parquet file.
+///
+/// # Errors
+///
+/// A file that cannot be read.
+pub fn footer_place(file: &impl ChunkReader) -> Result<Option<(u64, usize)>, ParquetError> {
+    let Some(before) = file.len().checked_sub(TRAILER) else { return Ok(None) };
+    let trailer = file.get_bytes(before, TRAILER as usize)?;
+    let [a, b, c, d, b'P', b'A', b'R', b'1'] = trailer[..] else { return Ok(None) };
+    let length = u32::from_le_bytes([a, b, c, d]);
+    Ok(before.checked_sub(length.into()).map(|start| (start, length as usize)))
+}
+
 /// Checks that the lists of the footer, if any, are as long as stated.
 ///
 /// # Errors
 ///
 /// A footer that is damaged or too large.
 pub fn check_footer(file: &impl ChunkReader) -> Result<(), ParquetError> {
-    const TRAILER: u64 = 8;
-    let Some(before) = file.len().checked_sub(TRAILER) else { return Ok(()) };
-    let trailer = file.get_bytes(before, TRAILER as usize)?;
-    let [a, b, c, d, b'P', b'A', b'R', b'1'] = trailer[..] else { return Ok(()) };
-    let length = u32::from_le_bytes([a, b, c, d]) as usize;
-    let Some(start) = before.checked_sub(length as u64) else { return Ok(()) };
+    let Some((start, length)) = footer_place(file)? else { return Ok(()) };
     if length > MAX_FOOTER_BYTES {
         return Err(excess("a footer", length as i64, MAX_FOOTER_BYTES as i64, "bytes"));
     }

@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use parquet::basic::Encoding;
 use parquet::file::statistics::Statistics;
 
-use super::chunk::{Chunk, Runs, page};
+use super::chunk::{Chunk, Runs, page, push};
 use super::dictionary;
 
 /// Numbers split in one block. Chosen: they stay in the first-level cache while all eight streams are written.
@@ -15,18 +15,14 @@ const BLOCK: usize = 512;
 
 /// Runs of rows with a number (1) and without one (0).
 pub fn presence(cells: &[f64]) -> Runs {
-    let mut runs: Runs = Vec::new();
-    let mut push = |code: u32, length: usize| match runs.last_mut() {
-        Some((last, total)) if *last == code => *total += length,
-        _ => runs.push((code, length)),
-    };
+    let mut runs = Runs::new();
     for block in cells.chunks(64) {
         let mut mask = present_mask(block);
         let mut left = block.len() as u32;
         while left > 0 {
             let code = mask & 1;
             let length = (if code == 1 { mask.trailing_ones() } else { mask.trailing_zeros() }).min(left);
-            push(code as u32, length as usize);
+            push(&mut runs, code as u32, length as usize);
             mask = mask.checked_shr(length).unwrap_or(0);
             left -= length;
         }
@@ -39,21 +35,22 @@ fn present_mask(block: &[f64]) -> u64 {
     block.iter().enumerate().fold(0, |mask, (i, cell)| mask | u64::from(!cell.is_nan()) << i)
 }
 
-/// The chunk of `cells`, of which `present` are numbers.
-pub fn chunk(cells: &[f64], present: &Runs) -> Chunk {
+/// The chunk of `cells`; NaN is null.
+pub fn chunk(cells: &[f64]) -> Chunk {
+    let present = presence(cells);
     let count = present.iter().filter(|run| run.0 == 1).map(|run| run.1).sum();
     let mut values = Vec::with_capacity(count);
     let mut row = 0;
-    for &(code, length) in present {
+    for &(code, length) in &present {
         if code == 1 {
             values.extend_from_slice(&cells[row..row + length]);
         }
         row += length;
     }
     if let Some((distinct, runs)) = repeating(&values) {
-        return dictionary::numbers(&distinct, runs.into_iter(), Some(present));
+        return dictionary::numbers(&distinct, runs.into_iter(), Some(&present));
     }
-    let mut data = page(Some(present), 8 * values.len());
+    let mut data = page(Some(&present), 8 * values.len());
     let start = data.len();
     data.resize(start + 8 * values.len(), 0);
     let range = split(&values, &mut data[start..]);

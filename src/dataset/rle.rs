@@ -26,6 +26,15 @@ pub fn bit_width(count: usize) -> u8 {
     (usize::BITS - count.saturating_sub(1).leading_zeros()).max(1) as u8
 }
 
+/// Appends an integer in groups of seven bits, the lowest first.
+pub fn varint(bytes: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        bytes.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value as u8);
+}
+
 struct Encoder {
     bytes: Vec<u8>,
     literals: Vec<u32>,
@@ -33,16 +42,8 @@ struct Encoder {
 }
 
 impl Encoder {
-    fn header(&mut self, mut value: u64) {
-        while value >= 0x80 {
-            self.bytes.push(value as u8 | 0x80);
-            value >>= 7;
-        }
-        self.bytes.push(value as u8);
-    }
-
     fn run(&mut self, value: u32, length: usize) {
-        self.header((length as u64) << 1);
+        varint(&mut self.bytes, (length as u64) << 1);
         let width = usize::from(self.bit_width.div_ceil(8));
         self.bytes.extend(&value.to_le_bytes()[..width]);
     }
@@ -52,7 +53,7 @@ impl Encoder {
             return;
         }
         self.literals.resize(self.literals.len().next_multiple_of(8), 0);
-        self.header((self.literals.len() as u64 / 8) << 1 | 1);
+        varint(&mut self.bytes, (self.literals.len() as u64 / 8) << 1 | 1);
         let (mut word, mut bits) = (0_u64, 0);
         for &value in &self.literals {
             word |= u64::from(value) << bits;

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
 use super::atomic;
-use super::folder::{DatasetError, Folder, failed, unwritten};
+use super::folder::{DatasetError, Folder, failed};
 use super::manifest::Manifest;
 
 /// Attempts to publish a manifest while another one appears and disappears. Chosen: each attempt fails only if another process does both in between.
@@ -121,25 +121,20 @@ impl Folder {
     fn publish(&self, planned: &Manifest) -> Result<Manifest, DatasetError> {
         let path = self.manifest_path();
         for _ in 0..ATTEMPTS {
-            let (manifest, step) = self.settle(planned)?;
-            let damage = |error: serde_json::Error| DatasetError::Manifest {
-                path: path.display().to_string(),
-                why: error.to_string(),
+            let (manifest, action) = self.settle(planned)?;
+            if action == ManifestAction::Keep {
+                return Ok(manifest);
+            }
+            let bytes = manifest
+                .to_bytes()
+                .map_err(|error| DatasetError::Manifest { path: path.display().to_string(), why: error.to_string() })?;
+            let written = match action {
+                ManifestAction::Create => atomic::write_new(&path, &bytes)?,
+                _ => atomic::write(&path, &bytes).map(|()| true)?,
             };
-            match step {
-                ManifestAction::Keep => return Ok(manifest),
-                ManifestAction::Replace => {
-                    let bytes = manifest.to_bytes().map_err(damage)?;
-                    atomic::write(&path, &bytes).map_err(|error| unwritten(&path, error))?;
-                    return Ok(manifest);
-                }
-                ManifestAction::Create => {
-                    let bytes = manifest.to_bytes().map_err(damage)?;
-                    if atomic::write_new(&path, &bytes).map_err(|error| unwritten(&path, error))? {
-                        return Ok(manifest);
-                    }
-                    // Another run was faster.
-                }
+            // Otherwise another run was faster.
+            if written {
+                return Ok(manifest);
             }
         }
         Err(self.taken("manifest.json appeared and disappeared"))

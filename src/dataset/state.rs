@@ -41,11 +41,7 @@ pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: Che
         CheckDepth::Footer => sealed_entries(path),
         CheckDepth::Whole => whole(path),
     };
-    let statistics = found.and_then(|entries| match entries {
-        Some(entries) => belongs(&entries, manifest, table, part).map(Some),
-        None => Ok(None),
-    });
-    match statistics {
+    match found.and_then(|entries| entries.map(|entries| belongs(&entries, manifest, table, part)).transpose()) {
         Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
         Ok(None) => State::Missing,
         Err(state) => state,
@@ -99,16 +95,16 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
         return damaged(&unreadable(&error));
     }
     let bytes = bytes::Bytes::from(bytes);
-    match checksum::is_intact(&bytes) {
-        Some(true) => metadata(&bytes).map(|metadata| Some(entries(&metadata))),
-        Some(false) => damaged("its checksum does not match its bytes"),
-        // Either the checksum is damaged, or the file is foreign.
-        None => match metadata(&bytes).map(|metadata| entries(&metadata)) {
-            Ok(entries) if !entries.iter().any(|entry| entry.key.starts_with(PREFIX)) => Ok(Some(entries)),
-            Ok(_) => damaged("it has no checksum"),
-            Err(state) => Err(state),
-        },
+    let is_intact = checksum::is_intact(&bytes);
+    if is_intact == Some(false) {
+        return damaged("its checksum does not match its bytes");
     }
+    let entries = entries(&metadata(&bytes)?);
+    // Without a checksum, either it is damaged, or the file is foreign.
+    if is_intact.is_none() && entries.iter().any(|entry| entry.key.starts_with(PREFIX)) {
+        return damaged("it has no checksum");
+    }
+    Ok(Some(entries))
 }
 
 fn unreadable(error: &io::Error) -> String {
@@ -145,12 +141,9 @@ fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) ->
     };
     let planned = manifest.table(table);
     let rows = planned.map(|planned| planned.rows_of(part));
-    let build = &manifest.build;
     let hash = |table: Option<&ManifestTable>| table.map_or_else(String::new, |table| table.hash.clone());
-    if found.build.version != build.version {
-        foreign("version", &build.version, &found.build.version)
-    } else if found.build.revision != build.revision {
-        foreign("numerics revision", &build.revision, &found.build.revision)
+    if let Some((what, expected, found)) = manifest.build.difference(&found.manifest.build) {
+        foreign(what, expected, found)
     } else if found.table != table {
         foreign("table", table, &found.table)
     } else if hash(found.planned()) != hash(planned) {

@@ -120,17 +120,14 @@ impl TableStatistics {
         let labels = layout.labels.iter().map(|name| (name.clone(), labelled(&view.label(name, rows.clone()))));
         statistics.labels = labels.collect();
         statistics.predicted = predicted(layout, &view, &rows, buffer);
-        let whole = |places: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>, ArrowError> {
-            places.map(|place| row(layout, row_index, rows.start + place as u64, buffer, place)).collect()
-        };
+        let row_at = |place: usize| row(layout, row_index, rows.start + place as u64, buffer, place);
         if row_index.rows() <= MAX_KEPT_ROWS as u64 {
-            statistics.rows = Some(whole(&mut (0..buffer.status.len()))?);
+            statistics.rows = Some((0..buffer.status.len()).map(row_at).collect::<Result<_, _>>()?);
         }
         let (many, found) = least(layout, &view, &rows, buffer);
-        let least = whole(&mut found.iter().map(|(_, place)| *place))?;
-        let firsts = found.iter().map(|(first, _)| rows.start + *first as u64);
-        statistics.least =
-            LeastGaps { many, each: firsts.zip(least).map(|(first, row)| LeastGapRow { first, row }).collect() };
+        let least_row = |(first, place)| Ok(LeastGapRow { first: rows.start + first as u64, row: row_at(place)? });
+        let each = found.into_iter().map(least_row).collect::<Result<_, ArrowError>>()?;
+        statistics.least = LeastGaps { many, each };
         Ok(statistics)
     }
 

@@ -116,10 +116,8 @@ impl Survey {
             survey
         });
         let tables = tables.collect();
-        let (temporary, others) =
-            folder.strays(manifest).into_iter().partition::<Vec<_>, _>(|(_, temporary)| *temporary);
-        let paths = |strays: Vec<(PathBuf, bool)>| strays.into_iter().map(|(path, _)| path).collect();
-        Survey { tables, temporary: paths(temporary), others: paths(others) }
+        let (temporary, others) = folder.strays(manifest);
+        Survey { tables, temporary, others }
     }
 
     /// Whether every part is present.
