@@ -8,7 +8,7 @@ use sqlparser::ast::{
     BinaryOperator, CaseWhen, CastKind, DataType, DuplicateTreatment, Expr, Function, FunctionArg, FunctionArgExpr,
     FunctionArgumentList, FunctionArguments, GroupByExpr, Ident, JoinConstraint, JoinOperator, NamedWindowDefinition,
     NamedWindowExpr, ObjectName, ObjectNamePart, OrderByExpr, OrderByKind, Query, Select, SelectItem, SetExpr,
-    Statement, TableFactor, UnaryOperator, Value, ValueWithSpan, WindowType,
+    Statement, TableFactor, UnaryOperator, Value, ValueWithSpan, VisitorMut, WindowType,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
@@ -16,7 +16,7 @@ use sqlparser::parser::{Parser, ParserError};
 use super::Source;
 use super::scan::Files;
 use super::units::{Columns, units};
-use super::walk::{Visit, walk};
+use super::walk::walk;
 use crate::names::hint;
 
 /// A valid query.
@@ -124,8 +124,10 @@ impl Check<'_> {
     }
 }
 
-impl Visit for Check<'_> {
-    fn query(&mut self, query: &mut Query) -> ControlFlow<()> {
+impl VisitorMut for Check<'_> {
+    type Break = ();
+
+    fn pre_visit_query(&mut self, query: &mut Query) -> ControlFlow<()> {
         for table in query.with.iter().flat_map(|with| &with.cte_tables) {
             let name = &table.alias.name.value;
             // polars would use the table of the dataset instead.
@@ -142,7 +144,7 @@ impl Visit for Check<'_> {
         }
     }
 
-    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+    fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         let Expr::Function(function) = &*expression else { return ControlFlow::Continue(()) };
         let argument = first_argument(function).filter(|argument| is_constant(argument));
         if argument.is_some() && is_one_of(AGGREGATE_FUNCTIONS, function) {
@@ -161,7 +163,7 @@ impl Visit for Check<'_> {
         }
     }
 
-    fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
+    fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {
         let joins = select.from.iter().flat_map(|from| &from.joins);
         let condition = joins.filter_map(|join| outer_condition(&join.join_operator));
         if let Some(condition) = condition.into_iter().find(|condition| !is_equalities(condition)) {
@@ -199,7 +201,7 @@ impl Visit for Check<'_> {
         ControlFlow::Continue(())
     }
 
-    fn table(&mut self, table: &mut TableFactor) -> ControlFlow<()> {
+    fn pre_visit_table_factor(&mut self, table: &mut TableFactor) -> ControlFlow<()> {
         let name = match &*table {
             TableFactor::Table { name, args: None, .. } => name,
             TableFactor::Table { name, .. } => {
@@ -251,17 +253,20 @@ fn first_function(expression: &Expr, wanted: fn(&Function) -> bool) -> Option<St
         depth: u32,
         found: Option<String>,
     }
-    impl Visit for Search {
-        fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
+    impl VisitorMut for Search {
+        type Break = ();
+
+        fn pre_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
             self.depth += 1;
             ControlFlow::Continue(())
         }
 
-        fn after_query(&mut self) {
+        fn post_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
             self.depth -= 1;
+            ControlFlow::Continue(())
         }
 
-        fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+        fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
             match expression {
                 Expr::Function(function) if self.depth == 0 && (self.wanted)(function) => {
                     self.found = Some(function.to_string());
@@ -323,8 +328,10 @@ fn is_equalities(condition: &Expr) -> bool {
 /// Whether an expression contains no column.
 fn is_constant(expression: &Expr) -> bool {
     struct Columns;
-    impl Visit for Columns {
-        fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+    impl VisitorMut for Columns {
+        type Break = ();
+
+        fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
             match expression {
                 Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Wildcard(_) | Expr::QualifiedWildcard(..) => {
                     ControlFlow::Break(())
@@ -339,8 +346,10 @@ fn is_constant(expression: &Expr) -> bool {
 /// The visitor that names the columns of every SELECT, also for use in ORDER BY.
 struct Names;
 
-impl Visit for Names {
-    fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
+impl VisitorMut for Names {
+    type Break = ();
+
+    fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {
         if let Some(mut having) = select.having.take() {
             let keys = keys_of(select);
             walk(&mut having, &mut HavingTerms { keys: &keys, projection: &select.projection, inside: 0 });
@@ -349,7 +358,7 @@ impl Visit for Names {
         ControlFlow::Continue(())
     }
 
-    fn query(&mut self, query: &mut Query) -> ControlFlow<()> {
+    fn pre_visit_query(&mut self, query: &mut Query) -> ControlFlow<()> {
         let SetExpr::Select(select) = query.body.as_mut() else { return ControlFlow::Continue(()) };
         let mut taken: HashSet<String> = HashSet::new();
         for item in &mut select.projection {
@@ -420,17 +429,20 @@ struct HavingTerms<'a> {
     inside: u32,
 }
 
-impl Visit for HavingTerms<'_> {
-    fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
+impl VisitorMut for HavingTerms<'_> {
+    type Break = ();
+
+    fn pre_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
         self.inside += 1;
         ControlFlow::Continue(())
     }
 
-    fn after_query(&mut self) {
+    fn post_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
         self.inside -= 1;
+        ControlFlow::Continue(())
     }
 
-    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+    fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         if self.inside == 0 {
             if self.keys.contains(expression) {
                 *expression = least(expression);
@@ -443,7 +455,7 @@ impl Visit for HavingTerms<'_> {
         ControlFlow::Continue(())
     }
 
-    fn after(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+    fn post_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         self.inside -= u32::from(matches!(expression, Expr::Function(function) if is_aggregate(function)));
         ControlFlow::Continue(())
     }
@@ -539,8 +551,10 @@ pub fn cast(expression: Expr, data_type: DataType) -> Expr {
     Expr::Cast { kind: CastKind::Cast, expr: Box::new(expression), data_type, array: false, format: None }
 }
 
-impl Visit for PolarsDialect {
-    fn select(&mut self, select: &mut Select) -> ControlFlow<()> {
+impl VisitorMut for PolarsDialect {
+    type Break = ();
+
+    fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {
         for NamedWindowDefinition(_, window) in &mut select.named_window {
             if let NamedWindowExpr::WindowSpec(window) = window {
                 order_nulls(&mut window.order_by);
@@ -549,7 +563,7 @@ impl Visit for PolarsDialect {
         ControlFlow::Continue(())
     }
 
-    fn after(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+    fn post_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         match expression {
             Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => *digits = plain(digits),
             Expr::Like { expr, .. }
@@ -569,12 +583,7 @@ impl Visit for PolarsDialect {
             // polars would return null for null.
             Expr::IsNotTrue(inner) => *expression = or_null(inner, Some(UnaryOperator::Not)),
             Expr::IsNotFalse(inner) => *expression = or_null(inner, None),
-            Expr::Function(function) => {
-                self.function(function);
-                if let Some(sum) = sum(function) {
-                    *expression = sum;
-                }
-            }
+            Expr::Function(function) => self.function(function),
             _ => {}
         }
         ControlFlow::Continue(())
@@ -598,9 +607,15 @@ fn order_nulls(keys: &mut Vec<OrderByExpr>) {
     let descends = first.options.asc == Some(false);
     let nulls_first = first.options.nulls_first.unwrap_or(descends);
     // Of 0 and 1, the one that comes first in this direction.
-    let place = |comes_first: bool| number(if comes_first == descends { "1" } else { "0" });
+    let place = |comes_first: bool| Expr::value(Value::Number(u8::from(comes_first == descends).to_string(), false));
     let is_null = Expr::IsNull(Box::new(first.expr.clone()));
-    let expr = case(is_null, place(nulls_first), Some(place(!nulls_first)));
+    let expr = Expr::Case {
+        case_token: AttachedToken::empty(),
+        end_token: AttachedToken::empty(),
+        operand: None,
+        conditions: vec![CaseWhen { condition: is_null, result: place(nulls_first) }],
+        else_result: Some(Box::new(place(!nulls_first))),
+    };
     keys.insert(0, OrderByExpr { expr, ..first });
     keys.iter_mut().for_each(|key| key.options.nulls_first = None);
 }
@@ -636,41 +651,9 @@ impl PolarsDialect {
     }
 }
 
-/// The sum as in standard SQL: null for no values, where polars returns 0.
-fn sum(function: &Function) -> Option<Expr> {
-    let FunctionArguments::List(list) = &function.args else { return None };
-    let is_plain = function.over.is_none()
-        && function.filter.is_none()
-        && list.duplicate_treatment.is_none()
-        && list.clauses.is_empty()
-        && list.args.len() == 1;
-    if !is_plain || !is_one_of("sum", function) {
-        return None;
-    }
-    let count = Function { name: ObjectName::from(vec![Ident::new("count")]), ..function.clone() };
-    let some = binary(Expr::Function(count), BinaryOperator::Gt, number("0"));
-    Some(case(some, Expr::Function(function.clone()), None))
-}
-
-/// `result` where `condition` holds, else `other` or null.
-pub fn case(condition: Expr, result: Expr, other: Option<Expr>) -> Expr {
-    Expr::Case {
-        case_token: AttachedToken::empty(),
-        end_token: AttachedToken::empty(),
-        operand: None,
-        conditions: vec![CaseWhen { condition, result }],
-        else_result: other.map(Box::new),
-    }
-}
-
 /// `left` and `right`, joined by an operator.
 pub fn binary(left: Expr, op: BinaryOperator, right: Expr) -> Expr {
     Expr::BinaryOp { left: Box::new(left), op, right: Box::new(right) }
-}
-
-/// A number.
-pub fn number(digits: &str) -> Expr {
-    Expr::value(Value::Number(digits.to_owned(), false))
 }
 
 /// The value of a whole number without a sign.

@@ -136,8 +136,6 @@ pub struct GroupAggregation<'a> {
     words: Vec<IndexSet<String>>,
     /// The groups of the first keys, by those of one key less and the code of the value of the next.
     pairs: Vec<IndexSet<(u32, u64)>>,
-    /// The number of groups.
-    count: usize,
     states: Vec<Vec<AggregateState>>,
 }
 
@@ -155,20 +153,22 @@ impl<'a> GroupAggregation<'a> {
             groups,
             words: vec![IndexSet::new(); keys],
             pairs: vec![IndexSet::new(); keys],
-            count: 0,
             states: vec![Vec::new(); groups.aggregates.len()],
         };
-        if keys == 0 {
-            aggregation.count = 1;
-            aggregation.grow();
-        }
+        aggregation.grow();
         aggregation
     }
 
+    /// The number of groups; without keys, all rows are one.
+    fn count(&self) -> usize {
+        self.pairs.last().map_or(1, IndexSet::len)
+    }
+
     fn grow(&mut self) {
+        let count = self.count();
         for (aggregate, states) in self.groups.aggregates.iter().zip(&mut self.states) {
             let number = if aggregate.measure == Measure::Sum { 0.0 } else { f64::NAN };
-            states.resize(self.count, AggregateState { count: 0, number });
+            states.resize(count, AggregateState { count: 0, number });
         }
     }
 
@@ -222,15 +222,11 @@ impl<'a> GroupAggregation<'a> {
                 };
             }
         }
-        if let Some(pairs) = self.pairs.last() {
-            self.count = pairs.len();
-        }
         ids
     }
 
     /// The groups as a table: columns `__g0`, `__g1`, ... of keys, and `__a0`, `__a1`, ... of aggregates.
     pub fn frame(self) -> PolarsResult<DataFrame> {
-        let height = self.count;
         let mut columns: Vec<Column> = Vec::new();
         for ((index, (_, kind)), codes) in self.groups.keys.iter().enumerate().zip(self.codes()) {
             let name = format!("__g{index}").into();
@@ -254,22 +250,19 @@ impl<'a> GroupAggregation<'a> {
                 Measure::Count => {
                     Int64Chunked::from_iter_values(name, states.iter().map(|tally| tally.count)).into_column()
                 }
-                Measure::Sum => {
-                    Float64Chunked::from_iter_values(name, states.iter().map(|tally| tally.number)).into_column()
-                }
                 _ => {
                     let number = |tally: &AggregateState| (tally.count > 0).then_some(tally.number);
                     Float64Chunked::from_iter_options(name, states.iter().map(number)).into_column()
                 }
             });
         }
-        DataFrame::new(height, columns)
+        DataFrame::new(self.count(), columns)
     }
 
     /// The codes of the values of each key, group by group.
     fn codes(&self) -> Vec<Vec<u64>> {
-        let mut codes = vec![vec![0; self.count]; self.pairs.len()];
-        for group in 0..self.count {
+        let mut codes = vec![vec![0; self.count()]; self.pairs.len()];
+        for group in 0..self.count() {
             let mut id = group as u32;
             for (pairs, codes) in self.pairs.iter().zip(&mut codes).rev() {
                 if let Some(&(rest, code)) = pairs.get_index(id as usize) {

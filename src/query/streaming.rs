@@ -8,17 +8,17 @@ use std::ops::ControlFlow;
 
 use sqlparser::ast::{
     BinaryOperator, DataType, ExactNumberInfo, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments,
-    GroupByExpr, Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor,
+    GroupByExpr, Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, VisitorMut,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
 use super::Source;
-use super::checked_query::{binary, case, cast, is_one_of, name, number, whole_number};
+use super::checked_query::{binary, cast, is_one_of, name, whole_number};
 use super::filter::{Top, of_where};
 use super::groups::{Aggregate, GroupQuery, Kind, Measure};
 use super::scan::Files;
-use super::walk::{Visit, walk};
+use super::walk::walk;
 
 /// The plan of a query that is computed part by part.
 pub struct StreamPlan {
@@ -335,16 +335,17 @@ impl AggregateExtractor<'_> {
                 let sum = self.column(Measure::Sum, &format!("CAST({argument} AS DOUBLE)"), column);
                 let count = self.column(Measure::Count, &argument, column);
                 let count = cast(count, DataType::Double(ExactNumberInfo::None));
-                // The mean of no values is null, not 0/0.
-                let some = binary(count.clone(), BinaryOperator::Gt, number("0.0"));
-                case(some, binary(sum, BinaryOperator::Divide, count), None)
+                // The mean of no values is null, as their sum is.
+                Expr::Nested(Box::new(binary(sum, BinaryOperator::Divide, count)))
             }
         })
     }
 }
 
-impl Visit for AggregateExtractor<'_> {
-    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+impl VisitorMut for AggregateExtractor<'_> {
+    type Break = ();
+
+    fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         if let Some(place) = self.keys.iter().position(|key| key == expression) {
             *expression = quoted(&format!("__g{place}"));
             return ControlFlow::Continue(());
@@ -371,12 +372,14 @@ struct ColumnSimplifier<'a> {
     aggregates: bool,
 }
 
-impl Visit for ColumnSimplifier<'_> {
-    fn query(&mut self, _: &mut Query) -> ControlFlow<()> {
+impl VisitorMut for ColumnSimplifier<'_> {
+    type Break = ();
+
+    fn pre_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
         ControlFlow::Break(())
     }
 
-    fn before(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+    fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         match expression {
             Expr::CompoundIdentifier(names) => match names.as_slice() {
                 [table, column] if table.value == self.table || table.value == self.alias => {
