@@ -76,7 +76,7 @@ impl<'a> Plane<'a> {
     /// The shortcut at a point.
     pub fn path(&self, place: Coefficients) -> Path<'a> {
         let [a_2, a_3] = self.coefficients(place);
-        self.landscape.path(a_2, a_3)
+        Path::exact(self.landscape.ends(), a_2, a_3)
     }
 
     /// Work, gradient and Hessian at an admissible point.
@@ -110,8 +110,8 @@ impl<'a> Plane<'a> {
     pub fn rough_conditions(&self, place: Coefficients) -> [Constraint; 4] {
         let [a_2, a_3] = self.coefficients(place).map(|a| a.high);
         let path = Path::new(self.landscape.ends(), a_2, a_3);
-        let at = |x: f64| (path.theta().at(x), path.n().at(x));
-        self.conditions_of_law(at, path.theta().minimum(), self.landscape.roughly_slowest(&path))
+        let at = |x: f64| (path.theta.at(x), path.n.at(x));
+        self.conditions_of_law(at, path.theta.minimum(), self.landscape.roughly_slowest(&path))
     }
 
     /// The conditions under another law than ageing, where `v >= 1` as long as the lack is at least a convex function of theta, from theta and `n`

@@ -24,14 +24,7 @@ pub(super) struct Slice {
 impl Slice {
     /// `int tau v dt` over the panel.
     pub fn sum(&self, map: PanelMap, rule: &Rule) -> f64 {
-        self.half
-            * match map {
-                PanelMap::Line => line(self, rule),
-                PanelMap::Power { side, gap, squarings: 1 } => square(self, side, gap, rule),
-                PanelMap::Power { side, gap, squarings: 2 } => fourth(self, side, gap, rule),
-                PanelMap::Power { side, gap, .. } => eighth(self, side, gap, rule),
-                PanelMap::Sinh { height } => sinh(self, height, rule),
-            }
+        self.half * sum(self, map, rule)
     }
 
     /// `tau v dt/dx` at one node.
@@ -58,40 +51,28 @@ impl Slice {
     }
 }
 
-/// A kernel for each map, compiled for three vector widths and selected at run time.
-macro_rules! kernels {
-    ($($(#[$doc:meta])* fn $name:ident($slice:ident $(, $argument:ident)*) = $map:expr;)*) => {$(
-        $(#[$doc])*
-        #[multiversion(targets(
-            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-            "x86_64+avx+avx2+bmi1+bmi2"
-        ))]
-        fn $name($slice: &Slice $(, $argument: f64)*, rule: &Rule) -> f64 {
-            $slice.weigh(rule, $map)
-        }
-    )*};
-}
-
-kernels! {
-    /// `delta = s`.
-    fn line(slice) = |s| (s, 1.0);
-    /// `delta = side (gap - s^2)`.
-    fn square(slice, side, gap) = |s| (side * (gap - s * s), 2.0 * s);
-    /// `delta = side (gap - s^4)`.
-    fn fourth(slice, side, gap) = |s| {
-        let s2 = s * s;
-        (side * (gap - s2 * s2), 4.0 * s * s2)
-    };
-    /// `delta = side (gap - s^8)`.
-    fn eighth(slice, side, gap) = |s| {
-        let s2 = s * s;
-        let s4 = s2 * s2;
-        (side * (gap - s4 * s4), 8.0 * s * s2 * s4)
-    };
-    /// `delta = height sinh s`.
-    fn sinh(slice, height) = |s| {
-        let q = exp(s);
-        let inverse = 1.0 / q;
-        (0.5 * height * (q - inverse), 0.5 * height * (q + inverse))
-    };
+/// The sum over a rule, with a loop for each map.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn sum(slice: &Slice, map: PanelMap, rule: &Rule) -> f64 {
+    match map {
+        PanelMap::Line => slice.weigh(rule, |s| (s, 1.0)),
+        PanelMap::Power { side, gap, squarings: 1 } => slice.weigh(rule, |s| (side * (gap - s * s), 2.0 * s)),
+        PanelMap::Power { side, gap, squarings: 2 } => slice.weigh(rule, |s| {
+            let s2 = s * s;
+            (side * (gap - s2 * s2), 4.0 * s * s2)
+        }),
+        PanelMap::Power { side, gap, .. } => slice.weigh(rule, |s| {
+            let s2 = s * s;
+            let s4 = s2 * s2;
+            (side * (gap - s4 * s4), 8.0 * s * s2 * s4)
+        }),
+        PanelMap::Sinh { height } => slice.weigh(rule, |s| {
+            let q = exp(s);
+            let inverse = 1.0 / q;
+            (0.5 * height * (q - inverse), 0.5 * height * (q + inverse))
+        }),
+    }
 }

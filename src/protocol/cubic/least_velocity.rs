@@ -105,27 +105,25 @@ impl Trend {
     }
 }
 
-macro_rules! searches {
-    ($($name:ident = $product:ty;)*) => {$(
-        #[multiversion(targets(
-            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-            "x86_64+avx+avx2+bmi1+bmi2"
-        ))]
-        pub(super) fn $name(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
-            least_velocities::<$product>(ends, a_2, a_3, wanted)
-        }
-    )*};
-}
-
-searches! {
-    near_slip_velocities = NearSlip;
-    slip_velocities = Slip;
-    prz_velocities = Prz;
+/// The least velocities under the law of Perrin, Rice and Zheng, or that of slip.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn least_velocities(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+    let powers = [Vector(*a_2), Vector(*a_3), ends.rise.high - (Vector(*a_2) + Vector(*a_3))];
+    if state == StateLaw::Prz {
+        least_by::<Prz>(ends, a_2, a_3, wanted)
+    } else if NearSlip::holds(ends.t_f, powers) {
+        least_by::<NearSlip>(ends, a_2, a_3, wanted)
+    } else {
+        least_by::<Slip>(ends, a_2, a_3, wanted)
+    }
 }
 
 /// The least velocities: at an end, or where the trend changes from falling to rising between two samples.
 #[inline(always)]
-fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+fn least_by<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
     let ([a_2, a_3], rise) = ([a_2, a_3].map(|a| Vector(*a)), ends.rise.high);
     let c = [Vector::splat(ends.theta_0.high), a_2, a_3, rise - (a_2 + a_3)];
     let n_ends = [ends.t_f - a_2, ends.t_f - (3.0 * rise - (2.0 * a_2 + a_3))];

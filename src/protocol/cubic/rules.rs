@@ -7,6 +7,7 @@
 
 use multiversion::multiversion;
 
+use super::bins::BINS;
 use super::path::Path;
 use crate::model::Law;
 use crate::numerics::cubic::{self, cubic_zeros, quadratic_zeros};
@@ -50,14 +51,14 @@ pub(super) struct MappedPanel {
     pub nodes: usize,
 }
 
-/// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes (`cargo bench --bench
-/// landscape`).
-const MAX_PLAIN_NODES: usize = 32;
+/// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes, and a larger power cannot save
+/// many (`cargo bench --bench landscape`).
+pub(super) const MAX_CHEAP_NODES: usize = 32;
 /// Number of nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay off from there on (`cargo bench --bench
 /// landscape`).
 const MIN_SINH_NODES: usize = 40;
-/// Number of nodes above which a panel is cut: that of the last bin. Derived.
-const MAX_UNCUT_NODES: usize = 80;
+/// Number of nodes above which a panel is cut: that of the last bin.
+const MAX_UNCUT_NODES: usize = BINS * NODE_STEP;
 /// Greatest number of nodes of a panel. Chosen: more than any panel needs after cuts.
 const MAX_NODES: usize = 256;
 /// Step of the number of nodes. Chosen: half of the lanes; a smaller step has more bins to fill, a larger one more spare nodes.
@@ -269,7 +270,7 @@ pub(super) fn choose(
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &NodeThresholds) -> (MappedPanel, f64) {
     let mut best = (line(zeros, low, high), 2.0);
-    let plain = accuracy.enough(MAX_PLAIN_NODES);
+    let plain = accuracy.enough(MAX_CHEAP_NODES);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
     // A real zero this close excludes the plain rule without computing its ellipse.
