@@ -10,6 +10,7 @@
 //! and the target is 0. Without mass the last equation is a constraint. With a rigid spring, `v = v_c`.
 
 use super::sensitivity::MIN_PATH_RTOL;
+use super::step_response::scaled_block::{X, Y, Z};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
@@ -18,7 +19,7 @@ use crate::protocol::{Motion, SpringBlock};
 use crate::stability::OpenLoopResult;
 
 /// Samples of one simulation, at most. Chosen: each takes some steps; more would take minutes a row.
-const MAX_SAMPLES: f64 = 1e5;
+const MAX_SAMPLES: u32 = 100_000;
 
 /// Distance from the target at `t_f` under continuous `v_c`: the Euclidean norm in `(ln v, ln theta, k s/a)`.
 ///
@@ -43,7 +44,7 @@ pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
 /// block or makes it unstable, and where a finer simulation of a more accurate shortcut does not agree.
 pub fn held_error(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, dt: f64, rtol: f64) -> OpenLoopResult {
     let samples = (t_f / dt).ceil().max(1.0);
-    if samples.is_nan() || samples > MAX_SAMPLES {
+    if samples.is_nan() || samples > f64::from(MAX_SAMPLES) {
         return OpenLoopResult { number: None, steps: 0 };
     }
     let mut steps = 0;
@@ -118,12 +119,7 @@ const MIN_SHIFT: f64 = 1e-15;
 const FIRST_STEP: f64 = 1e-3;
 
 /// Steps of one simulation, at most. Chosen: two for each sample.
-const MAX_STEPS: u32 = 200_000;
-
-/// Indices of the variables, in the order of elimination.
-const Z: usize = 0;
-const Y: usize = 1;
-const X: usize = 2;
+const MAX_STEPS: u32 = 2 * MAX_SAMPLES;
 
 /// Control velocity at the load point.
 enum Control<'a> {

@@ -19,8 +19,8 @@
 
 use multiversion::multiversion;
 
-use super::Exponent;
 use super::curve::{CurvePanel, MAX_PANELS, VelocityCurve, x_and_z_at_nodes};
+use super::{Exponent, panel_variation};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::numerics::root::{Probe, newton};
@@ -111,8 +111,8 @@ impl<E: Exponent> ArrivalProblem<E> {
     }
 
     /// Parameter `c` of the member that arrives, to `rtol`; the search begins at `start`. `None` where it fails.
-    pub fn solve(&self, start: f64, rtol: f64, panel_variation: f64, stats: &mut SolverStats) -> Option<f64> {
-        let required = self.required;
+    pub fn solve(&self, start: f64, rtol: f64, stats: &mut SolverStats) -> Option<f64> {
+        let (required, panel_variation) = (self.required, panel_variation(rtol));
         // The last Newton step doubles the digits.
         let enough = (0.1 * rtol).sqrt();
         let probe = |c: f64| {

@@ -9,7 +9,7 @@ mod integration;
 mod long_term;
 mod motion;
 mod orbit;
-mod scaled_block;
+pub(super) mod scaled_block;
 mod series;
 mod simulation;
 
@@ -141,12 +141,7 @@ pub struct ScaledStep {
 impl ScaledStep {
     /// Simulates the response until its long-term behaviour is decided.
     pub fn follow(&self, rtol: f64) -> Simulation {
-        follow(&self.slider, self.linear(), ln(self.ratio), rtol)
-    }
-
-    /// Linear stability of steady sliding at the final velocity.
-    fn linear(&self) -> LinearStability {
-        LinearStability::of(&self.slider)
+        follow(&self.slider, LinearStability::of(&self.slider), ln(self.ratio), rtol)
     }
 
     /// Parameters as bits: the key of the memo.

@@ -63,7 +63,7 @@ pub struct UnresolvedNumbers {
 }
 
 /// Accuracies of the runs, in units of `rtol`. Derived: a change by `rtol` between two runs leaves a tenth of it as error.
-const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
+pub(super) const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
 
 /// Difference of a logarithm between two runs, at least. Derived: rounding of a state of size 1 in 1e4 steps.
 pub(super) const MIN_DIFFERENCE: f64 = 1e-11;
