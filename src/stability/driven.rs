@@ -26,10 +26,9 @@ const MAX_SAMPLES: u32 = 100_000;
 /// Its sources are `rtol` and the rounding of the protocol, amplified along the path. `None` where the simulation does not
 /// reach `t_f`.
 pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
-    let v_f = path.jet(path.panels() - 1, 1.0).v[0];
     if path.slider.k == f64::INFINITY {
-        let theta = path.jet(path.panels() - 1, 1.0).theta;
-        return OpenLoopResult { number: Some(distance(&path.slider.law, [0.0, ln(theta * v_f)])), steps: 0 };
+        let end = path.end();
+        return OpenLoopResult { number: Some(distance(&path.slider.law, [0.0, ln(end.theta * end.v[0])])), steps: 0 };
     }
     let driven = Driven::new(path, Control::Continuous(path));
     let mut budget = MAX_STEPS;
@@ -77,7 +76,7 @@ fn held_distance(
     // In units of t_f.
     let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
     if slider.k == f64::INFINITY {
-        let v_f = path.jet(path.panels() - 1, 1.0).v[0];
+        let v_f = path.end().v[0];
         let (mut theta, mut v) = (path.jet(0, 0.0).theta, v_f);
         for i in 0..count {
             v = sample(i);
@@ -137,8 +136,7 @@ struct Driven<'a> {
 
 impl<'a> Driven<'a> {
     fn new(path: &CompliantPath, control: Control<'a>) -> Driven<'a> {
-        let v_f = path.jet(path.panels() - 1, 1.0).v[0];
-        Driven { slider: path.slider, t_f: path.duration(), v_f, control }
+        Driven { slider: path.slider, t_f: path.duration(), v_f: path.end().v[0], control }
     }
 
     /// Steady sliding at the initial velocity.

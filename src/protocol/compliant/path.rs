@@ -34,6 +34,11 @@ impl CompliantPath {
         self.resolution.panels[panel].jet(&self.resolution.curve, u)
     }
 
+    /// State at the end.
+    pub fn end(&self) -> Jet {
+        self.jet(self.panels() - 1, 1.0)
+    }
+
     /// State at a time, clamped to `[0, t_f]`.
     pub fn at_time(&self, t: f64) -> Jet {
         let panel = self.times.partition_point(|&start| start <= t).clamp(1, self.panels()) - 1;

@@ -74,15 +74,16 @@ impl Bins {
     }
 
     fn new() -> Bins {
-        let load = PendingBatch { panel_batch: PanelBatch::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
+        let load =
+            PendingBatch { panel_batch: PanelBatch::default(), indices: [0; LANES], count: 0, bin: 0, whole: false };
         let order = std::array::from_fn(|i| i);
         Bins {
             loads: [load; MAX_BUNDLES],
             order,
             ready: 0,
-            prepared: [Prepared::EMPTY; MAX_FULL_BUNDLES],
+            prepared: [Prepared::default(); MAX_FULL_BUNDLES],
             space: NodeBuffer::EMPTY,
-            cells: CellCache::EMPTY,
+            cells: CellCache::new(),
         }
     }
 

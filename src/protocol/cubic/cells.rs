@@ -34,7 +34,7 @@ pub(super) struct CellInputs {
 }
 
 /// The plan of one cell.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct CellPlan {
     place: CellKey,
     /// The age of its frame.
@@ -96,22 +96,11 @@ impl CellInputs {
     }
 }
 
-impl CellPlan {
-    const NONE: CellPlan = CellPlan {
-        place: [0; 2],
-        age: 0,
-        pace: [0.0; 4],
-        least: 0.0,
-        side: 0.0,
-        gap: 0.0,
-        squarings: 0.0,
-        from: 0.0,
-        to: 0.0,
-    };
-}
-
 impl CellCache {
-    pub const EMPTY: CellCache = CellCache { frame: None, age: 0, of: [CellPlan::NONE; CACHED_CELLS] };
+    /// A cache without cells.
+    pub fn new() -> CellCache {
+        CellCache { frame: None, age: 0, of: [CellPlan::default(); CACHED_CELLS] }
+    }
 
     /// Discards the cells of another frame.
     pub fn begin(&mut self, frame: &CellInputs) {
@@ -385,7 +374,7 @@ fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CE
         let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
         let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
         let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_CELL;
-        let none = CellPlan { place: cells[c], ..CellPlan::NONE };
+        let none = CellPlan { place: cells[c], ..CellPlan::default() };
         if !(unsure[c] == 0.0 && one_map && meant) {
             return none;
         }

@@ -4,7 +4,7 @@
 use multiversion::multiversion;
 
 use super::rules::PanelMap;
-use crate::numerics::elementary::{exp, ln};
+use crate::numerics::elementary::ln;
 use crate::numerics::gauss::Rule;
 use crate::numerics::lanes::{LANES, fold};
 
@@ -24,7 +24,7 @@ pub(super) struct Slice {
 impl Slice {
     /// `int tau v dt` over the panel.
     pub fn sum(&self, map: PanelMap, rule: &Rule) -> f64 {
-        self.half * sum(self, map, rule)
+        self.half * weigh(self, map, rule)
     }
 
     /// `tau v dt/dx` at one node.
@@ -37,13 +37,13 @@ impl Slice {
         (self.constant + self.a * ln(n) + self.slope * ln(theta)) * (n / theta)
     }
 
-    /// The weighted sum over a rule; `map` gives the distance from the centre and the Jacobian.
+    /// The weighted sum over a rule.
     #[inline(always)]
-    fn weigh(&self, rule: &Rule, map: impl Fn(f64) -> (f64, f64)) -> f64 {
+    fn weigh(&self, map: PanelMap, rule: &Rule) -> f64 {
         let mut sum = [0.0; LANES];
         for (x, w) in rule.x.chunks_exact(LANES).zip(rule.w.chunks_exact(LANES)) {
             for i in 0..LANES {
-                let (delta, jacobian) = map(self.middle + self.half * x[i]);
+                let (delta, jacobian) = map.place(self.middle + self.half * x[i]);
                 sum[i] += w[i] * jacobian * self.integrand(delta);
             }
         }
@@ -51,28 +51,17 @@ impl Slice {
     }
 }
 
-/// The sum over a rule, with a loop for each map.
+/// [`Slice::weigh`], with a loop for each kind of map.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn sum(slice: &Slice, map: PanelMap, rule: &Rule) -> f64 {
+fn weigh(slice: &Slice, map: PanelMap, rule: &Rule) -> f64 {
     match map {
-        PanelMap::Line => slice.weigh(rule, |s| (s, 1.0)),
-        PanelMap::Power { side, gap, squarings: 1 } => slice.weigh(rule, |s| (side * (gap - s * s), 2.0 * s)),
-        PanelMap::Power { side, gap, squarings: 2 } => slice.weigh(rule, |s| {
-            let s2 = s * s;
-            (side * (gap - s2 * s2), 4.0 * s * s2)
-        }),
-        PanelMap::Power { side, gap, .. } => slice.weigh(rule, |s| {
-            let s2 = s * s;
-            let s4 = s2 * s2;
-            (side * (gap - s4 * s4), 8.0 * s * s2 * s4)
-        }),
-        PanelMap::Sinh { height } => slice.weigh(rule, |s| {
-            let q = exp(s);
-            let inverse = 1.0 / q;
-            (0.5 * height * (q - inverse), 0.5 * height * (q + inverse))
-        }),
+        PanelMap::Line => slice.weigh(PanelMap::Line, rule),
+        PanelMap::Power { side, gap, squarings: 1 } => slice.weigh(PanelMap::Power { side, gap, squarings: 1 }, rule),
+        PanelMap::Power { side, gap, squarings: 2 } => slice.weigh(PanelMap::Power { side, gap, squarings: 2 }, rule),
+        PanelMap::Power { side, gap, .. } => slice.weigh(PanelMap::Power { side, gap, squarings: 3 }, rule),
+        PanelMap::Sinh { height } => slice.weigh(PanelMap::Sinh { height }, rule),
     }
 }

@@ -30,6 +30,7 @@ const ROUGH_ERROR: f64 = 1e-3;
 pub(super) const NEAR_ZERO: f64 = 0.5;
 
 /// The least velocities of eight shortcuts and their positions.
+#[derive(Default)]
 pub(super) struct Least {
     pub v: Lanes,
     pub place: Lanes,
@@ -37,10 +38,6 @@ pub(super) struct Least {
     pub doubt: Lanes,
     /// 1 where rounding matters.
     pub lossy: Lanes,
-}
-
-impl Least {
-    const NONE: Least = Least { v: [0.0; LANES], place: [0.0; LANES], doubt: [0.0; LANES], lossy: [0.0; LANES] };
 }
 
 /// A cubic and its derivatives at some places.
@@ -137,7 +134,7 @@ fn least_by<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -
         n: choose(is_first, n_ends[0], n_ends[1]),
     };
     let place = choose(is_first, Vector::splat(0.0), Vector::splat(1.0));
-    let mut found = Least { v: end.v.0, place: place.0, ..Least::NONE };
+    let mut found = Least { v: end.v.0, place: place.0, ..Least::default() };
     let open = open::<P>(ends, &c, &n_ends, &end, wanted);
     if open != [0.0; LANES] {
         let at_end = (found.v, found.place);

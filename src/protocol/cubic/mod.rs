@@ -53,10 +53,11 @@ type PerShortcut = [f64; SPAN_SHORTCUTS];
 #[derive(Debug, Clone)]
 pub struct Landscape {
     law: Law,
-    state: StateLaw,
+    pub(super) state: StateLaw,
     friction: FrictionTerms,
     floors: FrictionBounds,
-    ends: Ends,
+    /// The data common to all shortcuts.
+    pub(super) ends: Ends,
     t_f: f64,
     ln_t_f: f64,
     /// Work that depends on the ends alone.
@@ -104,17 +105,11 @@ impl Landscape {
         }
     }
 
-    /// The data common to all shortcuts.
-    pub(super) fn ends(&self) -> &Ends {
-        &self.ends
-    }
-
     /// The motion of the shortcut with these scaled coefficients, under a form of friction; `None` if it is infeasible.
     pub fn motion(&self, a_2: f64, a_3: f64, friction: Friction) -> Option<Box<dyn Motion>> {
-        let mut status = [Status::Infeasible];
-        self.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
-        let motion = motion::CubicPoint::new(self.clone(), [a_2, a_3], friction);
-        (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
+        let is_feasible = Path::new(&self.ends, a_2, a_3).exact_status() != Status::Infeasible;
+        let motion = motion::CubicPoint { of: self.clone(), place: [a_2, a_3], friction };
+        is_feasible.then(|| Box::new(motion) as Box<dyn Motion>)
     }
 
     /// Evaluates the shortcuts with the scaled coefficients `a_2[i] = alpha_2 t_f` and `a_3[i] = alpha_3 t_f^2`.
@@ -133,7 +128,7 @@ impl Landscape {
             of: self,
             status,
             v_min: &mut v_min[..velocities],
-            open: Queue::EMPTY,
+            open: Queue::default(),
             works: Works::new(self, &mut work[..works], &mut bins),
             doubtful: Vec::new(),
         };
@@ -165,11 +160,6 @@ impl Landscape {
         }
         bins.keep();
         stats
-    }
-
-    /// The evolution law of the state.
-    pub(super) fn state(&self) -> StateLaw {
-        self.state
     }
 
     /// The work of a feasible shortcut.

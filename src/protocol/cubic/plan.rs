@@ -17,7 +17,7 @@ use crate::numerics::lanes::LANES;
 use crate::numerics::real::Real;
 
 /// One panel for each shortcut.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PlannedPanels {
     /// The bin of the number of nodes; none from [`BINS`] on.
     pub bin: [u32; SPAN_SHORTCUTS],
@@ -34,23 +34,6 @@ pub(super) struct PlannedPanels {
     pub deeper: PerShortcut,
     /// The best cut of a panel with too many nodes.
     pub cut: PerShortcut,
-}
-
-impl PlannedPanels {
-    /// An empty plan.
-    pub const EMPTY: PlannedPanels = {
-        let none = [0.0; SPAN_SHORTCUTS];
-        PlannedPanels {
-            bin: [0; SPAN_SHORTCUTS],
-            squarings: none,
-            side: none,
-            gap: none,
-            from: none,
-            to: none,
-            deeper: none,
-            cut: none,
-        }
-    };
 }
 
 /// Single precision numbers of the widest vectors. Derived: half as long as doubles.
@@ -296,7 +279,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
     }
     // A focal sum is reduced by the possible error of the zeros.
     let lost = if is_coarse::<T>() { SINGLE_PRECISION_ERROR } else { 0.0 };
-    let steps = accuracy.in_steps();
+    let steps = &accuracy.focal;
     let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
     let cheap = limits[MAX_CHEAP_NODES / NODE_STEP - 1];
     let Powers { squarings, short } = powers::<T, SQUARINGS>([real, size], &gap, [low, high], cheap, &mut focal);

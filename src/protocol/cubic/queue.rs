@@ -3,7 +3,7 @@
 use super::{PerShortcut, SPAN_SHORTCUTS};
 
 /// A queue of up to a span of shortcuts of a landscape.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Queue {
     indices: [usize; SPAN_SHORTCUTS],
     a_2: PerShortcut,
@@ -12,9 +12,6 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    pub const EMPTY: Queue =
-        Queue { indices: [0; SPAN_SHORTCUTS], a_2: [0.0; SPAN_SHORTCUTS], a_3: [0.0; SPAN_SHORTCUTS], count: 0 };
-
     /// Adds the shortcut at `index`; returns whether the queue is full.
     #[inline(always)]
     pub fn push(&mut self, index: usize, a_2: f64, a_3: f64) -> bool {

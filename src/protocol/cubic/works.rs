@@ -37,9 +37,9 @@ impl<'a> Works<'a> {
     /// An empty queue for shortcuts of a landscape, whose works are written to `work`.
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, stats: SolverStats::default() };
-        let (from_cells, own) = (PlannedPanels::EMPTY, PlannedPanels::EMPTY);
-        let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
-        Works { due: Queue::EMPTY, planned }
+        let (from_cells, own) = (PlannedPanels::default(), PlannedPanels::default());
+        let planned = Planned { alone: Queue::default(), deep: Queue::default(), from_cells, own, sums };
+        Works { due: Queue::default(), planned }
     }
 
     /// Adds the feasible shortcut at `index`, if its work is requested.
@@ -120,7 +120,7 @@ impl Sums<'_> {
     /// Plans shortcuts with larger powers.
     fn deepen(&mut self, deep: &mut Queue) {
         let Some((indices, [a_2, a_3])) = deep.take() else { return };
-        let mut plan = PlannedPanels::EMPTY;
+        let mut plan = PlannedPanels::default();
         plan_parts(
             &self.of.ends,
             [a_2, a_3, &[0.0; SPAN_SHORTCUTS], &[1.0; SPAN_SHORTCUTS]],
@@ -158,7 +158,7 @@ impl Sums<'_> {
     fn part(&mut self) {
         let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
-        let mut plan = PlannedPanels::EMPTY;
+        let mut plan = PlannedPanels::default();
         plan_parts(&of.ends, parts, &of.accuracy_of_parts, &mut plan);
         let [a_2, a_3, low, high] = parts;
         for (k, &i) in indices.iter().enumerate() {

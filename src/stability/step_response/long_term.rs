@@ -10,7 +10,7 @@ use crate::numerics::elementary::{exp, ln};
 
 /// Small motions about steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearStability {
+pub(super) struct LinearStability {
     /// Whether they decay.
     pub stable: bool,
     /// Growth of `ln z` over a cycle; `None` if they do not oscillate.

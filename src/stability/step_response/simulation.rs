@@ -75,7 +75,8 @@ pub(super) const UNDERFLOW_LN_V: f64 = -1000.0;
 ///
 /// Runs at ever tighter tolerances end where no number changes by more than `rtol`. Otherwise the response is `Undecided`,
 /// or the numbers that change are unresolved.
-pub fn follow(slider: &ScaledBlock, linear: LinearStability, x: f64, rtol: f64) -> Simulation {
+pub(super) fn follow(slider: &ScaledBlock, x: f64, rtol: f64) -> Simulation {
+    let linear = LinearStability::of(slider);
     if let Some(long_term) = without_simulation(slider, linear, x) {
         let unresolved = UnresolvedNumbers::default();
         return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, unresolved };
