@@ -322,7 +322,7 @@ fn least(
         let stretch = place..end;
         place = end;
         let member = family.and_then(|family| FAMILIES.get(runs[family].1 as usize));
-        if member.is_some_and(|member| !member.arrives()) {
+        if member.is_some_and(|member| !member.arrives) {
             continue;
         }
         let best = least_in(stretch, gaps, &buffer.status);

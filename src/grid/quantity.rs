@@ -197,7 +197,7 @@ impl Quantity {
     /// The words of an axis of words, coded by index; empty for a number.
     pub fn words(self) -> Vec<&'static str> {
         match self {
-            Quantity::Family => FAMILIES.iter().map(|family| family.name()).collect(),
+            Quantity::Family => FAMILIES.iter().map(|family| family.name).collect(),
             Quantity::Law => StateLaw::ALL.map(StateLaw::name).into(),
             _ => Vec::new(),
         }

@@ -25,14 +25,13 @@ impl Cubic {
         c0 + x * (c1 + x * (c2 + x * c3))
     }
 
-    /// The least value on `[0, 1]`, at an end or at the one stationary minimum.
+    /// The least value on `[0, 1]`.
     #[inline(always)]
     pub fn least(&self) -> f64 {
-        let lower = |x: f64, y: f64| if y < x { y } else { x };
-        lower(lower(self.c[0], self.at(1.0)), self.at(self.minimum()))
+        self.lowest().1
     }
 
-    /// The position of the least value on `[0, 1]`, and this value.
+    /// The position of the least value on `[0, 1]`, an end or the one stationary minimum, and this value.
     #[inline(always)]
     pub fn lowest(&self) -> (f64, f64) {
         let inside = self.minimum();

@@ -11,7 +11,7 @@ const LN_2_HIGH: f64 = f64::from_bits(0x3FE6_2E42_FEFA_3800);
 const LN_2_LOW: f64 = 5.497923018708371e-14;
 
 /// `1.5 * 2^52`: added to a small number it leaves the nearest integer in the low bits. Derived: doubles from 2^52 to 2^53 are integers.
-const ROUND: f64 = 6755399441055744.0;
+pub(crate) const INTEGER_SHIFT: f64 = 6755399441055744.0;
 
 /// `(2 atanh s - 2 s)/s^3` in powers of `s^2`, Chebyshev interpolant on `|s| <= (sqrt 2 - 1)/(sqrt 2 + 1)`, truncation
 /// 5e-18. Made by `tests/reference/coefficients.py`.
@@ -54,6 +54,12 @@ pub fn ln_1p(x: f64) -> f64 {
     ln_grown(x, 1.0 / (1.0 + x))
 }
 
+/// `ln(ratio)` with full relative accuracy near 1, from `change`, which is `ratio - 1`.
+#[inline(always)]
+pub fn ln_near_1(change: f64, ratio: f64) -> f64 {
+    if change.abs() < 0.5 { ln_1p(change) } else { ln(ratio) }
+}
+
 /// [`ln_1p`] from `1/(1 + x)`.
 #[inline(always)]
 pub fn ln_grown(x: f64, inverse: f64) -> f64 {
@@ -87,7 +93,7 @@ pub fn exp_and_m1(x: f64) -> (f64, f64) {
     let r = high - low;
     let value = high + (r * r * polynomial(&EXP, r) - low);
     // Two factors, since 2^k itself may overflow or underflow.
-    let half = (0.5 * turns + ROUND) - ROUND;
+    let half = (0.5 * turns + INTEGER_SHIFT) - INTEGER_SHIFT;
     let exp = (1.0 + value) * power_of_two(half) * power_of_two(turns - half);
     // Within a factor of 2 of 1 the power is 1/2, 1 or 2, and exact; beyond, the difference does not cancel.
     let near = x > -0.6 && x < 0.6;
@@ -133,14 +139,14 @@ fn assemble(exponent: f64, f: f64, c: f64) -> f64 {
 /// `x = k ln 2 + high - low`: `(k, high, low)`.
 #[inline(always)]
 fn reduce(x: f64) -> (f64, f64, f64) {
-    let turns = (x * std::f64::consts::LOG2_E + ROUND) - ROUND;
+    let turns = (x * std::f64::consts::LOG2_E + INTEGER_SHIFT) - INTEGER_SHIFT;
     (turns, x - turns * LN_2_HIGH, turns * LN_2_LOW)
 }
 
 /// `2^k` for a whole `k` from -1022 to 1023.
 #[inline(always)]
 fn power_of_two(k: f64) -> f64 {
-    f64::from_bits(((k + (ROUND + 1023.0)).to_bits()) << 52)
+    f64::from_bits(((k + (INTEGER_SHIFT + 1023.0)).to_bits()) << 52)
 }
 
 /// `x` within `[low, high]`; NaN stays NaN.

@@ -40,7 +40,7 @@ pub fn lower(x: Vector, y: Vector) -> Vector {
 }
 
 /// [`Lanes`] with arithmetic, lane by lane.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(align(64))]
 pub struct Vector(pub Lanes);
 

@@ -95,6 +95,11 @@ impl Radau {
     }
 }
 
+/// `x^(1/NODES)`: the change of a panel's length for a change of its error at the nodes.
+pub fn root_of_order(x: f64) -> f64 {
+    x.sqrt().sqrt().sqrt().sqrt()
+}
+
 /// The sum of the columns of a matrix, each times the value of its node.
 #[inline(always)]
 fn combined(columns: &[Nodes; NODES], f: &Nodes) -> Nodes {

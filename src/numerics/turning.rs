@@ -108,31 +108,11 @@ pub fn turning_lanes<const N: usize>(w: &[f64; N]) -> Turnings<N> {
     }
     let mut found = Turnings { ln_u: [0.0; N], u: [0.0; N], excess: [0.0; N], over: [0.0; N], under: [0.0; N] };
     match (rises, turns, falls) {
-        (false, _, false) => {
-            for (i, &w) in w.iter().enumerate() {
-                found.set(i, near(w));
-            }
-        }
-        (false, false, true) => {
-            for (i, &w) in w.iter().enumerate() {
-                found.set(i, falling(w));
-            }
-        }
-        (false, true, true) => {
-            for (i, &w) in w.iter().enumerate() {
-                found.set(i, near_or_falling(w));
-            }
-        }
-        (true, false, false) => {
-            for (i, &w) in w.iter().enumerate() {
-                found.set(i, rising(w));
-            }
-        }
-        (true, ..) => {
-            for (i, &w) in w.iter().enumerate() {
-                found.set(i, any(w));
-            }
-        }
+        (false, _, false) => found.fill(w, near),
+        (false, false, true) => found.fill(w, falling),
+        (false, true, true) => found.fill(w, near_or_falling),
+        (true, false, false) => found.fill(w, rising),
+        (true, ..) => found.fill(w, any),
     }
     found
 }
@@ -151,10 +131,13 @@ fn any(w: f64) -> Lane {
 }
 
 impl<const N: usize> Turnings<N> {
+    /// Evaluates a formula at every argument.
     #[inline(always)]
-    fn set(&mut self, i: usize, place: Lane) {
-        (self.ln_u[i], self.u[i], self.excess[i]) = (place.ln_u, place.u, place.excess);
-        (self.over[i], self.under[i]) = (place.over, place.under);
+    fn fill(&mut self, w: &[f64; N], formula: impl Fn(f64) -> Lane) {
+        for (i, &w) in w.iter().enumerate() {
+            let Lane { ln_u, u, excess, over, under } = formula(w);
+            (self.ln_u[i], self.u[i], self.excess[i], self.over[i], self.under[i]) = (ln_u, u, excess, over, under);
+        }
     }
 }
 

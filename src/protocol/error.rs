@@ -71,10 +71,10 @@ fn of_ends(transition: &Transition, optimum: &Optimum) -> f64 {
 ///
 /// A third solve with a slightly longer duration measures the effect of its rounding, which matters near `t_min`. With bounded friction, theta
 /// and `v` are powers `e^((tau - 1)/a)` with a rounded exponent. The factor for very different velocities is measured.
-pub fn of_member(family: &dyn Family, case: &Case, member: &Shortcut, stats: &mut SolverStats) -> Option<f64> {
+pub fn of_member(family: &Family, case: &Case, member: &Shortcut, stats: &mut SolverStats) -> Option<f64> {
     let finest = family.solve(case, TIGHTEST_RTOL, stats).ok()?;
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
-    let (exponent, delay) = if family.uses_tau_ceiling() {
+    let (exponent, delay) = if family.uses_tau_ceiling {
         // Without a ceiling tau itself is rounded.
         let tau = if case.tau_ceiling.is_finite() { case.tau_ceiling } else { member.friction_max };
         (0.05 * (0.25 * ln(v_f / v_i)).powi(4).max(1.0) * (tau.abs() + b) / a, 1.5 * ROUNDING)

@@ -17,4 +17,5 @@ pub mod smoothness;
 
 pub use control::{Jet, SpringBlock};
 pub use motion::{Moment, Motion};
+pub(crate) use motion::{equal_landmarks, interval_at};
 pub use outcome::{Solved, SolverStats, Status};

@@ -19,6 +19,18 @@ pub struct Moment {
     pub beta: Option<f64>,
 }
 
+/// Landmarks of a motion of `count` intervals, which are equally long in `s`.
+pub(crate) fn equal_landmarks(count: usize) -> Vec<f64> {
+    (0..=count).map(|k| k as f64 / count as f64).collect()
+}
+
+/// The interval at `s` of `count` that are equally long in `s`, and the fraction of it.
+pub(crate) fn interval_at(s: f64, count: usize) -> (usize, f64) {
+    let along = s.clamp(0.0, 1.0) * count as f64;
+    let k = (along as usize).min(count - 1);
+    (k, along - k as f64)
+}
+
 /// A protocol as a curve over a parameter `s` from 0 to 1, along which time never falls.
 ///
 /// The parameter stretches layers that are thin in time. `at(0.0)` is just after the jump at the start, `at(1.0)` just

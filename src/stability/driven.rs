@@ -10,6 +10,7 @@
 //! and the target is 0. Without mass the last equation is a constraint. With a rigid spring, `v = v_c`.
 
 use super::sensitivity::MIN_PATH_RTOL;
+use super::step_response::scaled_block::{X, Y, Z};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
@@ -18,17 +19,16 @@ use crate::protocol::{Motion, SpringBlock};
 use crate::stability::OpenLoopResult;
 
 /// Samples of one simulation, at most. Chosen: each takes some steps; more would take minutes a row.
-const MAX_SAMPLES: f64 = 1e5;
+const MAX_SAMPLES: u32 = 100_000;
 
 /// Distance from the target at `t_f` under continuous `v_c`: the Euclidean norm in `(ln v, ln theta, k s/a)`.
 ///
 /// Its sources are `rtol` and the rounding of the protocol, amplified along the path. `None` where the simulation does not
 /// reach `t_f`.
 pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
-    let v_f = path.jet(path.panels() - 1, 1.0).v[0];
     if path.slider.k == f64::INFINITY {
-        let theta = path.jet(path.panels() - 1, 1.0).theta;
-        return OpenLoopResult { number: Some(distance(&path.slider.law, [0.0, ln(theta * v_f)])), steps: 0 };
+        let end = path.end();
+        return OpenLoopResult { number: Some(distance(&path.slider.law, [0.0, ln(end.theta * end.v[0])])), steps: 0 };
     }
     let driven = Driven::new(path, Control::Continuous(path));
     let mut budget = MAX_STEPS;
@@ -43,7 +43,7 @@ pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
 /// block or makes it unstable, and where a finer simulation of a more accurate shortcut does not agree.
 pub fn held_error(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, dt: f64, rtol: f64) -> OpenLoopResult {
     let samples = (t_f / dt).ceil().max(1.0);
-    if samples.is_nan() || samples > MAX_SAMPLES {
+    if samples.is_nan() || samples > f64::from(MAX_SAMPLES) {
         return OpenLoopResult { number: None, steps: 0 };
     }
     let mut steps = 0;
@@ -76,7 +76,7 @@ fn held_distance(
     // In units of t_f.
     let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
     if slider.k == f64::INFINITY {
-        let v_f = path.jet(path.panels() - 1, 1.0).v[0];
+        let v_f = path.end().v[0];
         let (mut theta, mut v) = (path.jet(0, 0.0).theta, v_f);
         for i in 0..count {
             v = sample(i);
@@ -118,12 +118,7 @@ const MIN_SHIFT: f64 = 1e-15;
 const FIRST_STEP: f64 = 1e-3;
 
 /// Steps of one simulation, at most. Chosen: two for each sample.
-const MAX_STEPS: u32 = 200_000;
-
-/// Indices of the variables, in the order of elimination.
-const Z: usize = 0;
-const Y: usize = 1;
-const X: usize = 2;
+const MAX_STEPS: u32 = 2 * MAX_SAMPLES;
 
 /// Control velocity at the load point.
 enum Control<'a> {
@@ -141,8 +136,7 @@ struct Driven<'a> {
 
 impl<'a> Driven<'a> {
     fn new(path: &CompliantPath, control: Control<'a>) -> Driven<'a> {
-        let v_f = path.jet(path.panels() - 1, 1.0).v[0];
-        Driven { slider: path.slider, t_f: path.duration(), v_f, control }
+        Driven { slider: path.slider, t_f: path.duration(), v_f: path.end().v[0], control }
     }
 
     /// Steady sliding at the initial velocity.

@@ -56,15 +56,13 @@ impl SteadySliding {
         let inertia = m * v * v;
         let sum = inertia + law.a;
         let (pull, push) = (law.a * k, weakening * sum);
-        let mut sliding = SteadySliding { law, k, m, v, inertia, sum, c: k - weakening, hurwitz: pull - push };
+        let mut sliding =
+            SteadySliding { law, k, m, v, inertia, sum, c: excess_stiffness(law, k), hurwitz: pull - push };
         if k.is_finite() && sliding.hurwitz.abs() < CANCELLATION * pull {
             let inertia = DoubleDouble::product(v, v) * DoubleDouble::new(m);
             let weakening = DoubleDouble::sum(law.b, -law.a);
             let push = weakening * (inertia + DoubleDouble::new(law.a));
             sliding.hurwitz = (DoubleDouble::product(law.a, k) - push).high;
-        }
-        if k.is_finite() && sliding.c.abs() < CANCELLATION * k {
-            sliding.c = (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high;
         }
         sliding
     }
@@ -104,12 +102,16 @@ impl SteadySliding {
 /// stable at every velocity, or at none.
 pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
     let weakening = law.b - law.a;
-    let mut spare = k - weakening;
-    if spare.abs() < CANCELLATION * k {
-        spare = (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high;
-    }
+    let spare = excess_stiffness(law, k);
     let velocity = (law.a * (spare / weakening) / m).sqrt();
     (weakening > 0.0 && spare > 0.0 && velocity.is_finite()).then_some(velocity)
+}
+
+/// `k - (b - a)`.
+fn excess_stiffness(law: Law, k: f64) -> f64 {
+    let plain = k - (law.b - law.a);
+    let cancels = plain.abs() < CANCELLATION * k;
+    if cancels { (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high } else { plain }
 }
 
 /// The two eigenvalues apart from a real one, scaled.

@@ -14,7 +14,7 @@
 use nalgebra::{DMatrix, DVectorView, Matrix3};
 
 use crate::numerics::elementary::exp;
-use crate::numerics::radau::{NODES, Radau, radau};
+use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
 use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::{Jet, SpringBlock};
 use crate::stability::OpenLoopResult;
@@ -72,7 +72,7 @@ fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> 
             let (next, error) = step(path, panel, (from, to), &flow, rule)?;
             // The order of the error at the end is higher than that at the nodes.
             let error = error * error.sqrt();
-            let change = 0.8 * sixteenth((tolerance / error.max(1e-30)).min(1e16));
+            let change = 0.8 * root_of_order((tolerance / error.max(1e-30)).min(1e16));
             if error > tolerance {
                 h = (to - from) * duration * change.clamp(0.2, 0.8);
             } else {
@@ -114,9 +114,6 @@ const COARSENING: f64 = 10.0;
 /// digits.
 const MIN_STEP_FACTOR: f64 = 1e-3;
 
-/// Rounding of a rate in its terms, in units of the last place. Chosen: that of a few operations.
-const ROUNDINGS: f64 = 1.0;
-
 /// A flow that counts as 0. Chosen: some decades above the least double.
 const VANISHED: f64 = 1e-290;
 
@@ -134,11 +131,6 @@ fn first_step(slider: &SpringBlock, jet: &Jet) -> f64 {
     let v = jet.v[0];
     let fastest = if slider.m > 0.0 { (slider.k / slider.m).sqrt().min(slider.law.a / slider.m / v) } else { 0.0 };
     1.0 / (fastest + v * (1.0 + slider.k / slider.law.a) + 1.0 / jet.theta)
-}
-
-/// Sixteenth root: the change of a step for a change of its error.
-fn sixteenth(x: f64) -> f64 {
-    x.sqrt().sqrt().sqrt().sqrt()
 }
 
 /// Flow after a step within a panel, and the relative error estimate of the nodes.
@@ -178,7 +170,7 @@ fn step(
             let changes = std::array::from_fn(|j| (0..n).map(|c| term(j, c)).sum());
             // The terms of a fast variable that follows the others cancel.
             let size = |j: usize| (0..n).map(|c| term(j, c).abs()).sum::<f64>();
-            let rounding = ROUNDINGS * f64::EPSILON * (0..NODES).map(size).fold(0.0, f64::max);
+            let rounding = f64::EPSILON * (0..NODES).map(size).fold(0.0, f64::max);
             error = error.max((rule.unresolved(&changes) - rounding) / largest);
         }
     }

@@ -72,7 +72,7 @@ fn needs_optimum(projection: &Projection) -> bool {
 
 /// Whether a row of `block` is compared with the optimum without ceilings.
 fn has_uncapped(block: &Block) -> bool {
-    let is_uncapped = |number: f64| FAMILIES.get(number as usize).is_some_and(|family| !family.uses_tau_ceiling());
+    let is_uncapped = |number: f64| FAMILIES.get(number as usize).is_some_and(|family| !family.uses_tau_ceiling);
     block.may_be(Quantity::Family, is_uncapped) || block.may_be(Quantity::FrictionCeiling, f64::is_infinite)
 }
 
@@ -101,7 +101,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
             status = status.compared_with(row.least.optimum);
         }
         let family = FAMILIES.get(point[Quantity::Family] as usize);
-        if family.is_some_and(|family| family.name() == "bounded_velocity") {
+        if family.is_some_and(|family| family.name == "bounded_velocity") {
             row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
         }
         row.member = Some(member);
@@ -113,7 +113,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
 fn bounds(job: &Job<'_>, point: &Point) -> Bounds {
     let free = without_ceilings(job);
     let family = FAMILIES.get(point[Quantity::Family] as usize);
-    let is_capped = family.is_some_and(|family| family.uses_tau_ceiling());
+    let is_capped = family.is_some_and(|family| family.uses_tau_ceiling);
     if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free }
 }
 
@@ -129,14 +129,14 @@ impl MemberCache {
     fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
         let number = point[Quantity::Family] as usize;
         let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };
-        if family.uses_tau_ceiling() {
+        if family.uses_tau_ceiling {
             return solve(job, family, point, work);
         }
         self.0.get((tuple, number), || solve(job, family, point, work))
     }
 }
 
-fn solve(job: &Job<'_>, family: &dyn Family, point: &Point, work: &mut RunStats) -> Solution {
+fn solve(job: &Job<'_>, family: &Family, point: &Point, work: &mut RunStats) -> Solution {
     let case = Case {
         transition: transition(point),
         t_f: point[Quantity::Time],

@@ -29,7 +29,7 @@ pub enum Protocol {
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
     CubicPoint { law: StateLaw, friction: Friction, a_2: f64, a_3: f64 },
     /// The member of a family.
-    Family(&'static dyn Family),
+    Family(&'static Family),
     /// The response of a block on a spring to a step of the control velocity.
     StepResponse { state_law: StateLaw, k: f64, m: f64 },
     /// The smooth shortcut on a spring.
@@ -51,9 +51,7 @@ pub fn quantities(name: &str) -> Vec<Quantity> {
                 "step_response" => &[Quantity::Law, Quantity::Stiffness, Quantity::Mass],
                 "compliant" => &[Quantity::Stiffness, Quantity::Mass],
                 "regularised" => &[Quantity::Stiffness, Quantity::Mass, Quantity::Smoothing],
-                _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling()) => {
-                    &[Quantity::FrictionCeiling]
-                }
+                _ if shortcut::find(name).is_some_and(|family| family.uses_tau_ceiling) => &[Quantity::FrictionCeiling],
                 _ => &[],
             },
         ),
@@ -133,7 +131,7 @@ pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
         ("compliant", "v, v' and v'' continuous, so that an elastic spring can drive it; with its v_c"),
         ("regularised", "the optimal protocol, its jumps made smooth in pieces of length delta_t; with its v_c"),
     ];
-    others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name(), family.doc()))).chain(elastic)
+    others.into_iter().chain(FAMILIES.into_iter().map(|family| (family.name, family.doc))).chain(elastic)
 }
 
 /// The path of a protocol: its motion and its numbers.
@@ -558,13 +556,13 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
-fn member(family: &dyn Family, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
+fn member(family: &Family, case: &Case, rtol: f64) -> Result<TracedPath, Absence> {
     let shortcut = family.solve(case, rtol, &mut SolverStats::default())?;
     let motion = family.motion(case, rtol)?;
     // A step has no least duration, but it counts as infeasible where every other protocol is.
     let late = case.t_f < case.transition.min_duration();
     let status = if late { Status::Infeasible } else { shortcut.status() };
-    let alpha = shortcut.alpha.into_iter().zip(family.alpha());
+    let alpha = shortcut.alpha.into_iter().zip(family.alpha);
     let mut parameters: Vec<_> = alpha.map(|(alpha, doc)| Parameter::new("alpha", alpha, "1", doc)).collect();
     if shortcut.miss != 0.0 {
         parameters.push(Parameter::new("miss", shortcut.miss, "1", "distance from the target, theta(t_f) v_f - 1"));

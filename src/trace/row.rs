@@ -84,7 +84,7 @@ pub fn protocol_of(
         Protocol::new(name, (friction, bounded), number).map_err(|quantity| Pathless::Missing(quantity.name()))?;
     let name = match protocol {
         Protocol::OptimalFrom { .. } => "optimal",
-        Protocol::Family(family) => family.name(),
+        Protocol::Family(family) => family.name,
         _ => name,
     };
     Ok((name.to_owned(), protocol, case))

@@ -211,7 +211,7 @@ fn help_lists_every_protocol_with_its_meaning() {
     for (name, doc) in slipsweep::trace::names() {
         assert!(text.lines().any(|line| line.contains(&format!("- {name}:")) && line.ends_with(doc)), "{name}\n{text}");
     }
-    assert!(shortcut::FAMILIES.iter().all(|family| text.contains(family.name())));
+    assert!(shortcut::FAMILIES.iter().all(|family| text.contains(family.name)));
 }
 
 #[test]

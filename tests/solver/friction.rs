@@ -117,7 +117,7 @@ fn protocols_have_the_friction_of_their_motions() {
             let case = Case { transition, t_f, tau_ceiling: f64::INFINITY };
             let Ok(found) = family.solve(&case, 1e-8, &mut SolverStats::default()) else { continue };
             let Ok(motion) = family.motion(&case, 1e-8) else { continue };
-            compare(found.status(), sampled(&*motion), &(what, family.name()));
+            compare(found.status(), sampled(&*motion), &(what, family.name));
             note(1, found.status());
         }
         let slider = SpringBlock { law: transition.law, k: 1.0, m: 0.0 };

@@ -20,7 +20,7 @@ fn friction_of_ends(law: Law, v_i: f64, v_f: f64) -> f64 {
     steady(v_i).max(steady(v_f))
 }
 
-fn solve(family: &dyn Family, case: &Case) -> Result<Shortcut, Obstacle> {
+fn solve(family: &Family, case: &Case) -> Result<Shortcut, Obstacle> {
     family.solve(case, RTOL, &mut SolverStats::default())
 }
 
@@ -52,17 +52,17 @@ fn balance(motion: &dyn Motion) -> f64 {
 }
 
 /// Solves, and checks what is found.
-fn examine(family: &dyn Family, case: &Case) -> Result<Shortcut, Obstacle> {
+fn examine(family: &Family, case: &Case) -> Result<Shortcut, Obstacle> {
     let solved = solve(family, case);
     let shortcut = match &solved {
         Ok(shortcut) => shortcut,
         Err(obstacle) => {
-            assert_ne!(*obstacle, Obstacle::NotConverged, "{} {case:?}", family.name());
+            assert_ne!(*obstacle, Obstacle::NotConverged, "{} {case:?}", family.name);
             return solved;
         }
     };
     let Transition { v_i, v_f, .. } = case.transition;
-    let name = family.name();
+    let name = family.name;
     assert!(shortcut.work.is_finite() && shortcut.friction_max.is_finite(), "{name} {case:?} {shortcut:?}");
     assert!(
         shortcut.v_min >= 0.0 && shortcut.v_min <= shortcut.v_max && shortcut.v_max < f64::INFINITY,
@@ -93,11 +93,11 @@ fn examine(family: &dyn Family, case: &Case) -> Result<Shortcut, Obstacle> {
 }
 
 /// The balance of theta along the motion of a member.
-fn assert_arrives(family: &dyn Family, case: &Case, accuracy: f64) {
-    let motion = family.motion(case, 1e-12).unwrap_or_else(|o| panic!("{} {case:?}: {o}", family.name()));
+fn assert_arrives(family: &Family, case: &Case, accuracy: f64) {
+    let motion = family.motion(case, 1e-12).unwrap_or_else(|o| panic!("{} {case:?}: {o}", family.name));
     let Transition { v_i, v_f, .. } = case.transition;
     let error = balance(&*motion) - (1.0 / v_f - 1.0 / v_i);
-    assert!(error.abs() <= accuracy * case.t_f, "{} {case:?}: {error:e}", family.name());
+    assert!(error.abs() <= accuracy * case.t_f, "{} {case:?}: {error:e}", family.name);
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn edge_time_of_the_hold_and_near_nothing_more() {
             let t_min = Transition { law, v_i, v_f }.min_duration();
             let case = case(law, v_i, v_f, t_min * (1.0 + 1e-12));
             for family in FAMILIES {
-                match (family.name(), examine(family, &case)) {
+                match (family.name, examine(family, &case)) {
                     // Between 1 and v_i, as fast as can be.
                     ("bounded_velocity", Ok(shortcut)) => assert_eq!(shortcut.v_min, 1.0),
                     // Friction is continuous: v rises from below 1, or it would take longer than the hold.
@@ -159,8 +159,8 @@ fn edge_times_of_1e_minus_6_and_1e3_and_velocities_of_1_001_to_1e8_in_both_direc
                         if let Ok(shortcut) = examine(family, &case) {
                             *count += 1;
                             // A long time: steady sliding at v_f for most of it, or slower.
-                            if fraction == 1e3 && v_f >= v_i && family.name() == "bounded_velocity" {
-                                assert!(shortcut.v_max <= 1.01 * v_f, "{} {case:?} {shortcut:?}", family.name());
+                            if fraction == 1e3 && v_f >= v_i && family.name == "bounded_velocity" {
+                                assert!(shortcut.v_max <= 1.01 * v_f, "{} {case:?} {shortcut:?}", family.name);
                             }
                         }
                     }
@@ -182,9 +182,9 @@ fn edge_equal_velocities_cost_their_gap_over_the_optimum_of_the_same_time() {
             let optimum = optimal::solve(&case.transition, t_f, true, 1e-12).value.expect("has an optimum").work;
             for family in FAMILIES {
                 let shortcut = examine(family, &case).expect("steady sliding is a member");
-                assert!(relative(shortcut.work, steady) < 1e-14, "{} {case:?}", family.name());
+                assert!(relative(shortcut.work, steady) < 1e-14, "{} {case:?}", family.name);
                 assert!(relative(shortcut.v_min, v) < 1e-15 && relative(shortcut.v_max, v) < 1e-15, "{shortcut:?}");
-                assert!((shortcut.work - optimum) / optimum >= -1e-12, "{} {case:?}", family.name());
+                assert!((shortcut.work - optimum) / optimum >= -1e-12, "{} {case:?}", family.name);
             }
         }
     }
@@ -250,7 +250,7 @@ fn edge_ratio_of_b_to_a_from_0_to_50_and_b_near_a() {
             let Ok(equal) = work(1.0) else { continue };
             for ratio in [1.0 - 1e-12, 1.0 + 1e-12, 1.0 - 2.3e-16, 1.0 + 2.3e-16] {
                 let near = work(ratio).expect("is as feasible");
-                assert!(relative(near, equal) < 1e-9, "{} {v_i} {v_f} {ratio}: {near} {equal}", family.name());
+                assert!(relative(near, equal) < 1e-9, "{} {v_i} {v_f} {ratio}: {near} {equal}", family.name);
             }
         }
     }
@@ -264,7 +264,7 @@ fn edge_exponents_that_overflow_when_written_naively() {
             let case = Case { tau_ceiling: 100.0, ..case(Law { a: 1e-4, b }, v_i, v_f, t_f) };
             for family in FAMILIES {
                 let solved = examine(family, &case);
-                assert!(solved.is_ok() || family.name() == "cubic", "{} {case:?} {solved:?}", family.name());
+                assert!(solved.is_ok() || family.name == "cubic", "{} {case:?} {solved:?}", family.name);
             }
         }
     }
@@ -276,10 +276,10 @@ fn edge_velocities_of_1() {
         let case = case(PAPER, v_i, v_f, 9.0);
         for family in FAMILIES {
             let solved = examine(family, &case);
-            if family.name() == "bounded_velocity" {
+            if family.name == "bounded_velocity" {
                 assert_eq!(solved, Err(Obstacle::End));
             } else {
-                assert!(solved.is_ok(), "{} {case:?}: {solved:?}", family.name());
+                assert!(solved.is_ok(), "{} {case:?}: {solved:?}", family.name);
             }
         }
     }

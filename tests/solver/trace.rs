@@ -461,7 +461,7 @@ fn extrema_of_the_velocity_are_those_of_the_solvers() {
         let shortcut = family.solve(&case, 1e-10, &mut SolverStats::default()).expect("exists");
         let trace = fewest(&path(protocol, case), case.transition);
         for (found, expected) in [(trace.v_min, shortcut.v_min), (trace.v_max, shortcut.v_max)] {
-            assert!(relative(found, expected) < 1e-9, "{} {case:?}: {found} {expected}", family.name());
+            assert!(relative(found, expected) < 1e-9, "{} {case:?}: {found} {expected}", family.name);
         }
     }
 }

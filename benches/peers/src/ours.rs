@@ -84,7 +84,7 @@ fn integrate<const S: usize>(
         let piece = step(&mut run, case.t_end).ok()?;
         if let Some(peaks) = &mut peaks {
             // To the order of the method, as the table polishes its extrema.
-            peaks.look(|u| match run.part(&piece, u) {
+            peaks.look(|u| match run.between(&piece, 0.0, u) {
                 Some(part) if u > 0.0 => part.end[X],
                 _ => piece.value(X, u),
             });

@@ -62,11 +62,6 @@ impl<const N: usize, const S: usize> DenseOutput<N, S> {
         DenseOutput::from_powers(self.t + from * self.h, (to - from) * self.h, start, powers)
     }
 
-    /// Time at its end.
-    pub fn t_end(&self) -> f64 {
-        self.t + self.h
-    }
-
     /// Change of variable `r` since the start at `u`, the fraction of the step (beyond 1: extrapolated).
     #[inline(always)]
     pub fn change(&self, r: usize, u: f64) -> f64 {

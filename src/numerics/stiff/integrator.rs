@@ -215,19 +215,13 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         }
     }
 
-    /// Integrates the first part of an accepted step again, up to the fraction `u`, so that its end has the order of the method. `None` if
-    /// Newton's method fails.
-    #[inline(always)]
-    pub fn part(&mut self, dense_output: &DenseOutput<N, S>, u: f64) -> Option<DenseOutput<N, S>> {
-        self.substep(dense_output, (dense_output.t, dense_output.start), 0.0, u)
-    }
-
-    /// Integrates the part of an accepted step between the fractions `from` and `to` again: the step is shorter, so its polynomial is closer to
-    /// the solution. `None` if Newton's method fails.
+    /// Integrates the part of an accepted step between the fractions `from` and `to` again: its end has the order of the method, and its polynomial
+    /// is closer to the solution. `None` if Newton's method fails.
     #[inline(always)]
     pub fn between(&mut self, dense_output: &DenseOutput<N, S>, from: f64, to: f64) -> Option<DenseOutput<N, S>> {
-        let start = if from > 0.0 { self.part(dense_output, from)?.end } else { dense_output.start };
-        self.substep(dense_output, (dense_output.t + from * dense_output.h, start), from, to)
+        let DenseOutput { t, start, .. } = *dense_output;
+        let start = if from > 0.0 { self.substep(dense_output, (t, start), 0.0, from)?.end } else { start };
+        self.substep(dense_output, (t + from * dense_output.h, start), from, to)
     }
 
     /// A step from `(t, y)`, at the fraction `from` of a step, to the fraction `to`.
@@ -529,7 +523,7 @@ mod tests {
         let (mut dense, mut exact) = (0.0_f64, 0.0_f64);
         while integrator.t() < 6.0 {
             let dense_output = integrator.step(6.0).expect("goes on");
-            let part = integrator.part(&dense_output, 0.4).expect("converges");
+            let part = integrator.between(&dense_output, 0.0, 0.4).expect("converges");
             let cos = libm::cos(dense_output.t + 0.4 * dense_output.h);
             dense = dense.max((dense_output.value(0, 0.4) - cos).abs());
             exact = exact.max((part.end[0] - cos).abs());

@@ -33,7 +33,7 @@
 //!
 //! If the equations jump (a control that is sampled and held), end a step there, and continue with a new integrator whose first step is
 //! [`Integrator::proposal`] of the old one. To evaluate a number inside a step with the order of the method, as for an event, integrate again up
-//! to it with [`Integrator::part`].
+//! to it with [`Integrator::between`].
 //!
 //! # Method
 //!

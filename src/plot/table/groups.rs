@@ -339,7 +339,7 @@ impl GroupRole {
         let place =
             |axis: Quantity| axes.iter().position(|name| self == GroupRole::Lines && name.as_ref() == axis.name());
         let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionCeiling)) else { return };
-        if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.uses_tau_ceiling()) {
+        if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.uses_tau_ceiling) {
             values[bound] = f64::NAN;
         }
     }

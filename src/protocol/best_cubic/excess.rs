@@ -53,7 +53,7 @@ struct EndPolynomials {
 impl EndPolynomials {
     fn of(path: &Path, bounded: bool, from_end: bool) -> EndPolynomials {
         let theta = path.exact_theta();
-        let (one, zero) = (DoubleDouble::new(1.0), DoubleDouble::new(0.0));
+        let one = DoubleDouble::new(1.0);
         let theta_1 = path.ends.theta_1;
         let rest = ExactCubic { c: [one - theta.c[0], -theta.c[1], -theta.c[2], -theta.c[3]] };
         let drop = ExactCubic { c: [theta.c[0] - theta_1, theta.c[1], theta.c[2], theta.c[3]] };
@@ -74,7 +74,7 @@ impl EndPolynomials {
             margin: about(&margin),
         };
         if from_end {
-            (side.drop[0], side.margin[0]) = (zero.high, zero.high);
+            (side.drop[0], side.margin[0]) = (0.0, 0.0);
         }
         side
     }
@@ -109,7 +109,7 @@ impl Excess<'_> {
 
     /// The point in its half of the path at which an optimum leaves the floor, by bisection; `None` if it is elsewhere.
     fn kink(&mut self, side: &EndPolynomials) -> Option<Option<f64>> {
-        let (mut held, mut free) = if side.from_end { (HALF, 0.0) } else { (0.0, HALF) };
+        let (mut held, mut free) = if side.from_end { (0.5, 0.0) } else { (0.0, 0.5) };
         // At the end no time is left for the floor.
         if !self.judge(side, held)?.1 || (!side.from_end && self.judge(side, free)?.1) {
             return Some(None);
@@ -125,9 +125,6 @@ impl Excess<'_> {
         Some(Some(free))
     }
 }
-
-/// The meeting point of both halves.
-const HALF: f64 = 0.5;
 
 /// `W_s - W*` of a shortcut that costs `work`; `None` where the optimal feedback is not available along it.
 pub(super) fn over_optimum(
@@ -170,8 +167,8 @@ pub(super) fn over_optimum(
 fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
     let [theta, slopes @ ..] = side.theta;
     let thin = theta / (theta + t_f + slopes.iter().map(|slope| slope.abs()).sum::<f64>());
-    let mut places = vec![0.0, HALF];
-    let mut width = HALF * PANEL_RATIO;
+    let mut places = vec![0.0, 0.5];
+    let mut width = 0.5 * PANEL_RATIO;
     while width > thin {
         places.push(width);
         width *= PANEL_RATIO;

@@ -39,7 +39,7 @@ impl<'a> Plane<'a> {
     /// The admissible shortcuts. The floor of theta is 0, or, for `b > a`, the root of `1 + (b - a) ln theta = b - a`, below which a smaller
     /// theta costs less: no optimum has friction this low. If an end is below the root, the floor is half of the theta of that end.
     pub fn new(landscape: &'a Landscape, law: Law, least_velocity: f64) -> Plane<'a> {
-        let ends = landscape.ends();
+        let ends = &landscape.ends;
         let floor = if law.b > law.a { exp(1.0 - 1.0 / (law.b - law.a)) } else { 0.0 };
         let lower = ends.theta_0.high.min(ends.theta_1.high);
         let floor = if floor < lower { floor } else { 0.5 * lower };
@@ -49,14 +49,14 @@ impl<'a> Plane<'a> {
 
     /// The straight line between the ends.
     pub fn line(&self) -> Coefficients {
-        let rise = self.landscape.ends().rise;
+        let rise = self.landscape.ends.rise;
         [if self.basis == Basis::End { -rise } else { rise }, DoubleDouble::new(0.0)]
     }
 
     /// The greatest distance of an admissible theta from the straight line: `theta' <= 1` bounds it by `t_f - (theta_1 -
     /// theta_0)`, and where `v >= 1`, `0 < theta < 1` does.
     pub fn reach(&self) -> f64 {
-        let ends = self.landscape.ends();
+        let ends = &self.landscape.ends;
         let reach = (DoubleDouble::new(ends.t_f) - ends.rise).high;
         if self.least_velocity >= 1.0 { reach.min(1.0) } else { reach }
     }
@@ -66,7 +66,7 @@ impl<'a> Plane<'a> {
         match self.basis {
             Basis::Start => [y_1, y_2],
             Basis::End => {
-                let rise = self.landscape.ends().rise;
+                let rise = self.landscape.ends.rise;
                 let [two, three] = [2.0, 3.0].map(DoubleDouble::new);
                 [three * rise + two * y_1 + y_2, -(three * (rise + y_1) + two * y_2)]
             }
@@ -76,7 +76,7 @@ impl<'a> Plane<'a> {
     /// The shortcut at a point.
     pub fn path(&self, place: Coefficients) -> Path<'a> {
         let [a_2, a_3] = self.coefficients(place);
-        self.landscape.path(a_2, a_3)
+        Path::exact(&self.landscape.ends, a_2, a_3)
     }
 
     /// Work, gradient and Hessian at an admissible point.
@@ -88,13 +88,13 @@ impl<'a> Plane<'a> {
     /// velocity at both ends.
     pub fn conditions(&self, place: Coefficients) -> [Constraint; 4] {
         let path = self.path(place);
-        if self.landscape.state() != StateLaw::Ageing {
+        if self.landscape.state != StateLaw::Ageing {
             return self.conditions_of_law(|x| path.at(x), path.exact_theta().minimum(), self.landscape.slowest(&path));
         }
         let mut theta = path.exact_theta();
         theta.c[0] = theta.c[0] - DoubleDouble::new(self.floor);
         let surplus = path.exact_surplus(self.least_velocity);
-        let scale = self.least_velocity * self.landscape.ends().t_f;
+        let scale = self.least_velocity * self.landscape.ends.t_f;
         let velocity = |x: f64| {
             let (d_theta, d_n) = self.basis.changes(x, 1.0 - x);
             let along = [d_n[0] - scale * d_theta[0], d_n[1] - scale * d_theta[1]];
@@ -109,15 +109,15 @@ impl<'a> Plane<'a> {
     /// The conditions under another law than ageing in double precision.
     pub fn rough_conditions(&self, place: Coefficients) -> [Constraint; 4] {
         let [a_2, a_3] = self.coefficients(place).map(|a| a.high);
-        let path = Path::new(self.landscape.ends(), a_2, a_3);
-        let at = |x: f64| (path.theta().at(x), path.n().at(x));
-        self.conditions_of_law(at, path.theta().minimum(), self.landscape.roughly_slowest(&path))
+        let path = Path::new(&self.landscape.ends, a_2, a_3);
+        let at = |x: f64| (path.theta.at(x), path.n.at(x));
+        self.conditions_of_law(at, path.theta.minimum(), self.landscape.roughly_slowest(&path))
     }
 
     /// The conditions under another law than ageing, where `v >= 1` as long as the lack is at least a convex function of theta, from theta and `n`
     /// at a place, the place of the least theta and the slowest place.
     fn conditions_of_law(&self, at: impl Fn(f64) -> (f64, f64), lowest: f64, slowest: f64) -> [Constraint; 4] {
-        let (state, t_f) = (self.landscape.state(), self.landscape.ends().t_f);
+        let (state, t_f) = (self.landscape.state, self.landscape.ends.t_f);
         let velocity = |x: f64| {
             let ((theta, n), (d_theta, d_n)) = (at(x), self.basis.changes(x, 1.0 - x));
             let [least, slope] = state.lack(theta);

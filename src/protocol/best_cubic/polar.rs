@@ -32,11 +32,11 @@ const MIN_WIDTH: f64 = 1e-8;
 /// Distance from the border, relative to that from the centre, at which the first search takes the border. Chosen: far above rounding.
 const INSET: f64 = 1e-10;
 /// Last step of the first search, in radians and fractions. Chosen: as long as a [`DIFFERENCE`].
-const ROUGH_STEP: f64 = 1e-3;
+const ROUGH_STEP: f64 = DIFFERENCE;
 /// Relative range of the works in a set which [`ROUGH_RTOL`] resolves. Chosen: a thousand times that.
-const MIN_RANGE: f64 = 1e-5;
+const MIN_RANGE: f64 = 1e3 * ROUGH_RTOL;
 /// Works this close to the least one after the first search are refined. Chosen: a hundred times the accuracy of that search.
-const CLOSE_WORK: f64 = 1e-6;
+const CLOSE_WORK: f64 = 1e2 * ROUGH_RTOL;
 
 /// Last step of a refinement, in radians and fractions. Derived: the work at a corner is linear in the step, so the step is rounding.
 const LAST_STEP: f64 = 1e-14;

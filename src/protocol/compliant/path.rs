@@ -1,7 +1,7 @@
 //! The compliant shortcut over time, with the control velocity that drives it.
 
 use crate::protocol::profile::{Hermite, ResolvedPanel, ResolvedProfile, VelocityCurve};
-use crate::protocol::{Jet, Moment, Motion, SpringBlock};
+use crate::protocol::{Jet, Moment, Motion, SpringBlock, interval_at};
 
 /// The shortcut in consecutive panels; it is smooth on the scale of a panel.
 pub struct CompliantPath {
@@ -34,6 +34,11 @@ impl CompliantPath {
         self.resolution.panels[panel].jet(&self.resolution.curve, u)
     }
 
+    /// State at the end.
+    pub fn end(&self) -> Jet {
+        self.jet(self.panels() - 1, 1.0)
+    }
+
     /// State at a time, clamped to `[0, t_f]`.
     pub fn at_time(&self, t: f64) -> Jet {
         let panel = self.times.partition_point(|&start| start <= t).clamp(1, self.panels()) - 1;
@@ -52,9 +57,8 @@ impl Motion for CompliantPath {
     }
 
     fn at(&self, s: f64) -> Moment {
-        let along = s.clamp(0.0, 1.0) * self.panels() as f64;
-        let panel = (along as usize).min(self.panels() - 1);
-        let v_c = self.slider.control(&self.jet(panel, along - panel as f64));
+        let (panel, u) = interval_at(s, self.panels());
+        let v_c = self.slider.control(&self.jet(panel, u));
         Moment { v_c: Some(v_c), ..self.resolution.at(s) }
     }
 }

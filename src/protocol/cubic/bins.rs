@@ -4,17 +4,17 @@ use std::cell::Cell;
 
 use multiversion::multiversion;
 
-use super::Landscape;
 use super::cells::CellCache;
 use super::panel_batch::{NodeBuffer, PanelBatch, Prepared, prepare};
-use super::plan::{PerShortcut, PlannedPanels};
+use super::plan::PlannedPanels;
 use super::rules::NODE_STEP;
+use super::{Landscape, PerShortcut};
 use crate::model::StateLaw;
-use crate::numerics::gauss::primitive;
+use crate::numerics::gauss::{MAX_HALF, primitive};
 use crate::numerics::lanes::LANES;
 
-/// Number of bins: 4, 8, … 80 nodes. A panel with more nodes is cut. Chosen: four more than [`CUT_BIN`], for panels shorter than `[0, 1]`.
-pub(super) const BINS: usize = 20;
+/// Number of bins: 4, 8, … 80 nodes, those of the rules with a primitive. A panel with more nodes is cut.
+pub(super) const BINS: usize = 2 * MAX_HALF / NODE_STEP;
 
 /// Bin from which a panel over all of `[0, 1]` is cut. Measured: two parts are cheaper there (`cargo bench --bench landscape`).
 pub(super) const CUT_BIN: usize = 16;
@@ -74,15 +74,16 @@ impl Bins {
     }
 
     fn new() -> Bins {
-        let load = PendingBatch { panel_batch: PanelBatch::EMPTY, indices: [0; LANES], count: 0, bin: 0, whole: false };
+        let load =
+            PendingBatch { panel_batch: PanelBatch::default(), indices: [0; LANES], count: 0, bin: 0, whole: false };
         let order = std::array::from_fn(|i| i);
         Bins {
             loads: [load; MAX_BUNDLES],
             order,
             ready: 0,
-            prepared: [Prepared::EMPTY; MAX_FULL_BUNDLES],
+            prepared: [Prepared::default(); MAX_FULL_BUNDLES],
             space: NodeBuffer::EMPTY,
-            cells: CellCache::EMPTY,
+            cells: CellCache::new(),
         }
     }
 

@@ -9,12 +9,10 @@ use multiversion::multiversion;
 
 use super::bins::CUT_BIN;
 use super::path::{Ends, Path};
-use super::plan::{
-    MAX_CHEAP_NODES, MIN_GAP, PAIRS, PLANNED_SHORTCUTS, PerShortcut, Places, PlannedPanels, SINGLE_PRECISION_ERROR,
-    nearest, places, rooted,
-};
-use super::rules::{NODE_STEP, NodeThresholds, ZEROS};
-use crate::numerics::elementary::rough_ln;
+use super::plan::{MIN_GAP, PAIRS, Places, PlannedPanels, SINGLE_PRECISION_ERROR, nearest, places, rooted};
+use super::rules::{MAX_CHEAP_NODES, NODE_STEP, NodeThresholds, ZEROS};
+use super::{PerShortcut, SPAN_SHORTCUTS};
+use crate::numerics::elementary::{INTEGER_SHIFT, rough_ln};
 use crate::numerics::lanes::{LANES, Vector};
 
 /// A cache of the plans of the last used cells of a landscape.
@@ -36,7 +34,7 @@ pub(super) struct CellInputs {
 }
 
 /// The plan of one cell.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct CellPlan {
     place: CellKey,
     /// The age of its frame.
@@ -61,7 +59,7 @@ type CellKey = [u64; 2];
 const CACHED_CELLS: usize = 64;
 
 /// Cells that are planned together, each from all its samples.
-const CELLS_PER_PLAN: usize = PLANNED_SHORTCUTS / SAMPLES.len();
+const CELLS_PER_PLAN: usize = SPAN_SHORTCUTS / SAMPLES.len();
 
 /// Samples of a cell: its corners, then the middles of its edges.
 const SAMPLES: [[f64; 2]; 8] =
@@ -73,9 +71,6 @@ const CORNERS: usize = 4;
 /// Cells per power of 2 below the mean of n, the scale of the feasible set. Measured: more cells need more plans, fewer have worse maps (`cargo
 /// bench --bench landscape`).
 const CELLS_PER_UNIT: f64 = 8.0;
-
-/// `1.5 * 2^52`, whose last bit is 1: added to a number, it leaves the nearest integer. Derived.
-const INTEGER_SHIFT: f64 = 6755399441055744.0;
 
 /// Greatest distance of a planned cell from the origin, in cells. Chosen: coordinates of farther cells lose digits.
 const MAX_CELL: f64 = 1e9;
@@ -101,22 +96,11 @@ impl CellInputs {
     }
 }
 
-impl CellPlan {
-    const NONE: CellPlan = CellPlan {
-        place: [0; 2],
-        age: 0,
-        pace: [0.0; 4],
-        least: 0.0,
-        side: 0.0,
-        gap: 0.0,
-        squarings: 0.0,
-        from: 0.0,
-        to: 0.0,
-    };
-}
-
 impl CellCache {
-    pub const EMPTY: CellCache = CellCache { frame: None, age: 0, of: [CellPlan::NONE; CACHED_CELLS] };
+    /// A cache without cells.
+    pub fn new() -> CellCache {
+        CellCache { frame: None, age: 0, of: [CellPlan::default(); CACHED_CELLS] }
+    }
 
     /// Discards the cells of another frame.
     pub fn begin(&mut self, frame: &CellInputs) {
@@ -141,8 +125,8 @@ impl CellCache {
     /// Plans feasible shortcuts from their cells.
     pub fn plan(&mut self, frame: &CellInputs, a_2: &PerShortcut, a_3: &PerShortcut, plan: &mut PlannedPanels) {
         let located = locate(frame.scale, a_2, a_3);
-        let (mut runs, mut count) = ([LaneRun { from: 0, slot: 0 }; PLANNED_SHORTCUTS], 0);
-        let (mut missing, mut lost) = ([[0; 2]; PLANNED_SHORTCUTS], 0);
+        let (mut runs, mut count) = ([LaneRun { from: 0, slot: 0 }; SPAN_SHORTCUTS], 0);
+        let (mut missing, mut lost) = ([[0; 2]; SPAN_SHORTCUTS], 0);
         // The previous cell, and the cell before the last missing one.
         let (mut last, mut before) = (located.place(0), located.place(0));
         let mut starts = located.starts;
@@ -179,7 +163,7 @@ impl CellCache {
             return;
         }
         // A slot contains only its last cell.
-        for lane in 0..PLANNED_SHORTCUTS {
+        for lane in 0..SPAN_SHORTCUTS {
             let place = located.place(lane);
             let slot = CellCache::slot(place);
             if !self.holds(slot, place) {
@@ -204,7 +188,7 @@ struct LaneRun {
 
 /// The cells of shortcuts, and the distances from the cell centres.
 struct CellOffsets {
-    places: [[u64; PLANNED_SHORTCUTS]; 2],
+    places: [[u64; SPAN_SHORTCUTS]; 2],
     local: [PerShortcut; 2],
     /// Bit mask of the lanes whose cell differs from that of the previous lane.
     starts: u32,
@@ -222,10 +206,9 @@ impl CellOffsets {
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn locate(scale: f64, a_2: &PerShortcut, a_3: &PerShortcut) -> CellOffsets {
-    let mut located =
-        CellOffsets { places: [[0; PLANNED_SHORTCUTS]; 2], local: [[0.0; PLANNED_SHORTCUTS]; 2], starts: 1 };
+    let mut located = CellOffsets { places: [[0; SPAN_SHORTCUTS]; 2], local: [[0.0; SPAN_SHORTCUTS]; 2], starts: 1 };
     for ((places, local), a) in located.places.iter_mut().zip(&mut located.local).zip([a_2, a_3]) {
-        for i in 0..PLANNED_SHORTCUTS {
+        for i in 0..SPAN_SHORTCUTS {
             let x = a[i] * scale;
             let middle = x + INTEGER_SHIFT;
             places[i] = middle.to_bits();
@@ -233,7 +216,7 @@ fn locate(scale: f64, a_2: &PerShortcut, a_3: &PerShortcut) -> CellOffsets {
         }
     }
     let [i, j] = &located.places;
-    for lane in 1..PLANNED_SHORTCUTS {
+    for lane in 1..SPAN_SHORTCUTS {
         let other = (i[lane] != i[lane - 1]) | (j[lane] != j[lane - 1]);
         located.starts |= u32::from(other) << lane;
     }
@@ -265,10 +248,10 @@ fn bin(pace: f64, least: f64) -> u32 {
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn assemble(cells: &[CellPlan; CACHED_CELLS], runs: &[LaneRun], located: &CellOffsets, plan: &mut PlannedPanels) {
-    let from = |run: usize| runs.get(run).map_or(PLANNED_SHORTCUTS, |run| run.from as usize);
+    let from = |run: usize| runs.get(run).map_or(SPAN_SHORTCUTS, |run| run.from as usize);
     let cell = |run: usize| &cells[runs[run].slot as usize % CACHED_CELLS];
     let mut run = 0;
-    for start in (0..PLANNED_SHORTCUTS).step_by(LANES) {
+    for start in (0..SPAN_SHORTCUTS).step_by(LANES) {
         let lanes = start..start + LANES;
         while from(run + 1) <= start {
             run += 1;
@@ -311,8 +294,8 @@ const ORDER: Vector = Vector([0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5]);
 
 /// Copies one value per cell to all its samples.
 #[inline(always)]
-fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; PLANNED_SHORTCUTS] {
-    let mut all = [of[0]; PLANNED_SHORTCUTS];
+fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; SPAN_SHORTCUTS] {
+    let mut all = [of[0]; SPAN_SHORTCUTS];
     for places in all.chunks_exact_mut(CELLS_PER_PLAN) {
         places.copy_from_slice(&of);
     }
@@ -321,7 +304,7 @@ fn spread<T: Copy>(of: [T; CELLS_PER_PLAN]) -> [T; PLANNED_SHORTCUTS] {
 
 /// The least value of each cell.
 #[inline(always)]
-fn lowest(values: &[f32; PLANNED_SHORTCUTS]) -> [f32; CELLS_PER_PLAN] {
+fn lowest(values: &[f32; SPAN_SHORTCUTS]) -> [f32; CELLS_PER_PLAN] {
     let mut lowest = [f32::MAX; CELLS_PER_PLAN];
     for places in values.chunks_exact(CELLS_PER_PLAN) {
         for c in 0..CELLS_PER_PLAN {
@@ -353,7 +336,7 @@ fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CE
     let middles = [0, 1].map(|k| std::array::from_fn(|c| f64::from_bits(cells[c][k]) - INTEGER_SHIFT));
     let [a_2, a_3] = samples(&middles, 1.0 / scale);
     let Places { re, im, doubt } = places::<f32>(ends, &a_2, &a_3);
-    let (mut straight, shadow) = nearest(&re, &im, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]);
+    let (mut straight, shadow) = nearest(&re, &im, &[0.0; SPAN_SHORTCUTS], &[1.0; SPAN_SHORTCUTS]);
     for straight in &mut straight {
         *straight = 2.0 * straight.sqrt();
     }
@@ -364,11 +347,10 @@ fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CE
         *gain = squared - straight;
     }
     let (gains, sides) = (spread(gain), spread(centres.side));
-    let (mut paces, mut lost, mut unsure) =
-        ([0.0; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS], [0.0f32; CELLS_PER_PLAN]);
+    let (mut paces, mut lost, mut unsure) = ([0.0; SPAN_SHORTCUTS], [0.0f32; SPAN_SHORTCUTS], [0.0f32; CELLS_PER_PLAN]);
     let steady = if ends.rise.high < 0.0 { 1.0 } else { -1.0 };
     let mean = ends.t_f - ends.rise.high;
-    for i in 0..PLANNED_SHORTCUTS {
+    for i in 0..SPAN_SHORTCUTS {
         let focal = if gains[i] > 0.0 { squared[i] } else { straight[i] };
         // The margin for errors of the zeros.
         let excess = (f64::from(focal) - 2.0) * (0.5 / (1.0 + SINGLE_PRECISION_ERROR));
@@ -392,7 +374,7 @@ fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CE
         let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
         let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
         let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_CELL;
-        let none = CellPlan { place: cells[c], ..CellPlan::NONE };
+        let none = CellPlan { place: cells[c], ..CellPlan::default() };
         if !(unsure[c] == 0.0 && one_map && meant) {
             return none;
         }
@@ -436,9 +418,9 @@ struct Centres {
 impl Centres {
     /// The centres as far beyond an end as the projected zeros of the samples allow.
     #[inline(always)]
-    fn of(shadow: &[f32; PLANNED_SHORTCUTS]) -> Centres {
-        let (mut above, mut below) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
-        for i in 0..PLANNED_SHORTCUTS {
+    fn of(shadow: &[f32; SPAN_SHORTCUTS]) -> Centres {
+        let (mut above, mut below) = ([0.0f32; SPAN_SHORTCUTS], [0.0f32; SPAN_SHORTCUTS]);
+        for i in 0..SPAN_SHORTCUTS {
             let upper = shadow[i] > 0.5;
             let beyond = if upper { shadow[i] - 1.0 } else { -shadow[i] };
             let beyond = if beyond > 0.0 { beyond } else { 0.0 };
@@ -460,26 +442,22 @@ impl Centres {
 /// The map `r ± s^2` for the samples of each cell.
 struct Squared {
     /// The focal sums of the samples.
-    focal: [f32; PLANNED_SHORTCUTS],
+    focal: [f32; SPAN_SHORTCUTS],
     /// Negative where the centre of the map itself limits the focal sum, so that a larger power might help.
     room: [f32; CELLS_PER_PLAN],
 }
 
 impl Squared {
     #[inline(always)]
-    fn of(
-        re: &[[f32; PLANNED_SHORTCUTS]; ZEROS],
-        im: &[[f32; PLANNED_SHORTCUTS]; ZEROS],
-        centres: &Centres,
-    ) -> Squared {
+    fn of(re: &[[f32; SPAN_SHORTCUTS]; ZEROS], im: &[[f32; SPAN_SHORTCUTS]; ZEROS], centres: &Centres) -> Squared {
         let (side, gap) = (spread(centres.side), spread(centres.gap));
-        let (mut near, mut far) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
-        for i in 0..PLANNED_SHORTCUTS {
+        let (mut near, mut far) = ([0.0f32; SPAN_SHORTCUTS], [0.0f32; SPAN_SHORTCUTS]);
+        for i in 0..SPAN_SHORTCUTS {
             (near[i], far[i]) = (gap[i].sqrt(), (1.0 + gap[i]).sqrt());
         }
-        let mut least = [f32::MAX; PLANNED_SHORTCUTS];
+        let mut least = [f32::MAX; SPAN_SHORTCUTS];
         for k in 0..ZEROS {
-            for i in 0..PLANNED_SHORTCUTS {
+            for i in 0..SPAN_SHORTCUTS {
                 let end = if side[i] > 0.0 { 1.0 - re[k][i] } else { re[k][i] };
                 let (x, y) = (gap[i] + end, im[k][i]);
                 let size = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
@@ -487,8 +465,8 @@ impl Squared {
                 least[i] = if sum < least[i] { sum } else { least[i] };
             }
         }
-        let (mut focal, mut room) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
-        for i in 0..PLANNED_SHORTCUTS {
+        let (mut focal, mut room) = ([0.0f32; SPAN_SHORTCUTS], [0.0f32; SPAN_SHORTCUTS]);
+        for i in 0..SPAN_SHORTCUTS {
             focal[i] = 2.0 * least[i].sqrt() / (far[i] - near[i]);
             let ceiling = 4.0 * near[i] / (far[i] - near[i]);
             room[i] = 0.5 * ceiling - (focal[i] - 2.0);

@@ -5,6 +5,8 @@
 //! it is nowhere negative on the line. The remaining shortcuts are decided one by one: friction is stationary at the roots of a polynomial of
 //! degree four.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 
 use super::path::{Ends, Path};
@@ -25,7 +27,7 @@ pub(super) struct FrictionBounds {
 const MAX_LOGARITHM_DECREASE: f64 = 0.499;
 
 impl FrictionBounds {
-    pub fn new(law: Law, ends: &Ends) -> FrictionBounds {
+    fn new(law: Law, ends: &Ends) -> FrictionBounds {
         let Law { a, b } = law;
         let theta = if b > a {
             exp(-MAX_LOGARITHM_DECREASE / (b - a))
@@ -55,7 +57,7 @@ impl FrictionBounds {
     /// A bit mask of the feasible shortcuts that the bounds do not decide.
     pub fn open(&self, ends: &Ends, a_2: &Lanes, a_3: &Lanes, status: &[Status; LANES]) -> u32 {
         let mut open = 0;
-        for (i, &sure) in self.sure(ends, a_2, a_3).iter().enumerate() {
+        for (i, &sure) in sure(self, ends, a_2, a_3).iter().enumerate() {
             if sure == 0.0 && status[i] != Status::Infeasible && !self.settle(&Path::new(ends, a_2[i], a_3[i])) {
                 open |= 1 << i;
             }
@@ -63,55 +65,40 @@ impl FrictionBounds {
         open
     }
 
-    /// 1 in lanes whose coefficients in Bernstein's form are above the bounds.
-    fn sure(&self, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
-        bounds(self, ends, a_2, a_3)
-    }
-
     /// Whether the least values are above the bounds.
     fn settle(&self, path: &Path) -> bool {
         let slack = path.slack();
-        path.n().least() > self.n + path.n().doubt() + 3.0 * slack
-            && path.theta().least() > self.theta + path.theta().doubt() + slack
+        path.n.least() > self.n + path.n.doubt() + 3.0 * slack
+            && path.theta.least() > self.theta + path.theta.doubt() + slack
     }
 }
 
+/// 1 in lanes whose coefficients in Bernstein's form are above the bounds.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn bounds(floors: &FrictionBounds, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
+fn sure(floors: &FrictionBounds, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes {
     let mut sure = [0.0; LANES];
     for i in 0..LANES {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let slack = path.slack();
-        let n = path.n().bounds().0 > floors.n + path.n().doubt() + 3.0 * slack;
-        let theta = path.theta().bounds().0 > floors.theta + path.theta().doubt() + slack;
+        let n = path.n.bounds().0 > floors.n + path.n.doubt() + 3.0 * slack;
+        let theta = path.theta.bounds().0 > floors.theta + path.theta.doubt() + slack;
         sure[i] = if n & theta { 1.0 } else { 0.0 };
     }
     sure
 }
 
-/// Consecutive shortcuts that the bounds do not decide, on a line in the plane or not.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct UndecidedShortcuts {
-    pub first: usize,
-    pub count: usize,
-    pub line: bool,
-}
-
-impl UndecidedShortcuts {
-    /// Sets the status of the shortcuts with negative friction; `path` returns the shortcut at an index.
-    pub fn decide<'a>(&self, law: Law, path: impl Fn(usize) -> Path<'a>, status: &mut [Status]) {
-        let UndecidedShortcuts { first, count, line } = *self;
-        let is_negative = |i: usize| path(i).friction_min(law) < 0.0;
-        if line && law.b >= law.a && !is_negative(first) && !is_negative(first + count - 1) {
-            return;
-        }
-        for (i, status) in status.iter_mut().enumerate().skip(first).take(count) {
-            if *status != Status::Infeasible && is_negative(i) {
-                *status = Status::NegativeFriction;
-            }
+/// Sets the status of the shortcuts with negative friction among consecutive ones on a line in the plane; `path` returns the shortcut at an index.
+pub(super) fn decide<'a>(all: Range<usize>, law: Law, path: impl Fn(usize) -> Path<'a>, status: &mut [Status]) {
+    let is_negative = |i: usize| path(i).friction_min(law) < 0.0;
+    if all.len() > 1 && law.b >= law.a && !is_negative(all.start) && !is_negative(all.end - 1) {
+        return;
+    }
+    for i in all {
+        if status[i] != Status::Infeasible && is_negative(i) {
+            status[i] = Status::NegativeFriction;
         }
     }
 }
@@ -128,7 +115,7 @@ impl Path<'_> {
                 f64::NEG_INFINITY
             }
         };
-        let lows = [0.0, 1.0, self.theta().minimum(), self.n().minimum()];
+        let lows = [0.0, 1.0, self.theta.minimum(), self.n.minimum()];
         let mut least = lows.into_iter().map(friction).fold(f64::INFINITY, f64::min);
         for end in [0.0, 1.0] {
             if least < 0.0 {

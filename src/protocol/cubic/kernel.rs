@@ -4,7 +4,7 @@
 use multiversion::multiversion;
 
 use super::rules::PanelMap;
-use crate::numerics::elementary::{exp, ln};
+use crate::numerics::elementary::ln;
 use crate::numerics::gauss::Rule;
 use crate::numerics::lanes::{LANES, fold};
 
@@ -24,14 +24,7 @@ pub(super) struct Slice {
 impl Slice {
     /// `int tau v dt` over the panel.
     pub fn sum(&self, map: PanelMap, rule: &Rule) -> f64 {
-        self.half
-            * match map {
-                PanelMap::Line => line(self, rule),
-                PanelMap::Power { side, gap, squarings: 1 } => square(self, side, gap, rule),
-                PanelMap::Power { side, gap, squarings: 2 } => fourth(self, side, gap, rule),
-                PanelMap::Power { side, gap, .. } => eighth(self, side, gap, rule),
-                PanelMap::Sinh { height } => sinh(self, height, rule),
-            }
+        self.half * weigh(self, map, rule)
     }
 
     /// `tau v dt/dx` at one node.
@@ -44,13 +37,13 @@ impl Slice {
         (self.constant + self.a * ln(n) + self.slope * ln(theta)) * (n / theta)
     }
 
-    /// The weighted sum over a rule; `map` gives the distance from the centre and the Jacobian.
+    /// The weighted sum over a rule.
     #[inline(always)]
-    fn weigh(&self, rule: &Rule, map: impl Fn(f64) -> (f64, f64)) -> f64 {
+    fn weigh(&self, map: PanelMap, rule: &Rule) -> f64 {
         let mut sum = [0.0; LANES];
         for (x, w) in rule.x.chunks_exact(LANES).zip(rule.w.chunks_exact(LANES)) {
             for i in 0..LANES {
-                let (delta, jacobian) = map(self.middle + self.half * x[i]);
+                let (delta, jacobian) = map.place(self.middle + self.half * x[i]);
                 sum[i] += w[i] * jacobian * self.integrand(delta);
             }
         }
@@ -58,40 +51,17 @@ impl Slice {
     }
 }
 
-/// A kernel for each map, compiled for three vector widths and selected at run time.
-macro_rules! kernels {
-    ($($(#[$doc:meta])* fn $name:ident($slice:ident $(, $argument:ident)*) = $map:expr;)*) => {$(
-        $(#[$doc])*
-        #[multiversion(targets(
-            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-            "x86_64+avx+avx2+bmi1+bmi2"
-        ))]
-        fn $name($slice: &Slice $(, $argument: f64)*, rule: &Rule) -> f64 {
-            $slice.weigh(rule, $map)
-        }
-    )*};
-}
-
-kernels! {
-    /// `delta = s`.
-    fn line(slice) = |s| (s, 1.0);
-    /// `delta = side (gap - s^2)`.
-    fn square(slice, side, gap) = |s| (side * (gap - s * s), 2.0 * s);
-    /// `delta = side (gap - s^4)`.
-    fn fourth(slice, side, gap) = |s| {
-        let s2 = s * s;
-        (side * (gap - s2 * s2), 4.0 * s * s2)
-    };
-    /// `delta = side (gap - s^8)`.
-    fn eighth(slice, side, gap) = |s| {
-        let s2 = s * s;
-        let s4 = s2 * s2;
-        (side * (gap - s4 * s4), 8.0 * s * s2 * s4)
-    };
-    /// `delta = height sinh s`.
-    fn sinh(slice, height) = |s| {
-        let q = exp(s);
-        let inverse = 1.0 / q;
-        (0.5 * height * (q - inverse), 0.5 * height * (q + inverse))
-    };
+/// [`Slice::weigh`], with a loop for each kind of map.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn weigh(slice: &Slice, map: PanelMap, rule: &Rule) -> f64 {
+    match map {
+        PanelMap::Line => slice.weigh(PanelMap::Line, rule),
+        PanelMap::Power { side, gap, squarings: 1 } => slice.weigh(PanelMap::Power { side, gap, squarings: 1 }, rule),
+        PanelMap::Power { side, gap, squarings: 2 } => slice.weigh(PanelMap::Power { side, gap, squarings: 2 }, rule),
+        PanelMap::Power { side, gap, .. } => slice.weigh(PanelMap::Power { side, gap, squarings: 3 }, rule),
+        PanelMap::Sinh { height } => slice.weigh(PanelMap::Sinh { height }, rule),
+    }
 }

@@ -30,6 +30,7 @@ const ROUGH_ERROR: f64 = 1e-3;
 pub(super) const NEAR_ZERO: f64 = 0.5;
 
 /// The least velocities of eight shortcuts and their positions.
+#[derive(Default)]
 pub(super) struct Least {
     pub v: Lanes,
     pub place: Lanes,
@@ -37,10 +38,6 @@ pub(super) struct Least {
     pub doubt: Lanes,
     /// 1 where rounding matters.
     pub lossy: Lanes,
-}
-
-impl Least {
-    const NONE: Least = Least { v: [0.0; LANES], place: [0.0; LANES], doubt: [0.0; LANES], lossy: [0.0; LANES] };
 }
 
 /// A cubic and its derivatives at some places.
@@ -105,27 +102,25 @@ impl Trend {
     }
 }
 
-macro_rules! searches {
-    ($($name:ident = $product:ty;)*) => {$(
-        #[multiversion(targets(
-            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-            "x86_64+avx+avx2+bmi1+bmi2"
-        ))]
-        pub(super) fn $name(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
-            least_velocities::<$product>(ends, a_2, a_3, wanted)
-        }
-    )*};
-}
-
-searches! {
-    near_slip_velocities = NearSlip;
-    slip_velocities = Slip;
-    prz_velocities = Prz;
+/// The least velocities under the law of Perrin, Rice and Zheng, or that of slip.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub(super) fn least_velocities(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+    let powers = [Vector(*a_2), Vector(*a_3), ends.rise.high - (Vector(*a_2) + Vector(*a_3))];
+    if state == StateLaw::Prz {
+        least_by::<Prz>(ends, a_2, a_3, wanted)
+    } else if NearSlip::holds(ends.t_f, powers) {
+        least_by::<NearSlip>(ends, a_2, a_3, wanted)
+    } else {
+        least_by::<Slip>(ends, a_2, a_3, wanted)
+    }
 }
 
 /// The least velocities: at an end, or where the trend changes from falling to rising between two samples.
 #[inline(always)]
-fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
+fn least_by<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
     let ([a_2, a_3], rise) = ([a_2, a_3].map(|a| Vector(*a)), ends.rise.high);
     let c = [Vector::splat(ends.theta_0.high), a_2, a_3, rise - (a_2 + a_3)];
     let n_ends = [ends.t_f - a_2, ends.t_f - (3.0 * rise - (2.0 * a_2 + a_3))];
@@ -139,7 +134,7 @@ fn least_velocities<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &
         n: choose(is_first, n_ends[0], n_ends[1]),
     };
     let place = choose(is_first, Vector::splat(0.0), Vector::splat(1.0));
-    let mut found = Least { v: end.v.0, place: place.0, ..Least::NONE };
+    let mut found = Least { v: end.v.0, place: place.0, ..Least::default() };
     let open = open::<P>(ends, &c, &n_ends, &end, wanted);
     if open != [0.0; LANES] {
         let at_end = (found.v, found.place);

@@ -21,35 +21,43 @@ mod screen;
 mod work_derivatives;
 mod works;
 
+use std::ops::Range;
+
 use super::{Motion, SolverStats, Status};
 use crate::model::{Friction, Law, StateLaw, Transition};
-use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use bins::Bins;
 use cells::CellInputs;
-use friction::{FrictionBounds, UndecidedShortcuts};
+use friction::{FrictionBounds, decide};
 use kernel::Slice;
 use panel_batch::FrictionTerms;
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{MappedPanel, NodeThresholds, Zeros, choose};
 use screen::{
-    BATCH_SPANS, SEARCH_SHORTCUTS, SPAN_SHORTCUTS, SpanDecision, end_velocities, end_velocities_of_span,
-    inner_velocities, on_side, screen, settle,
+    BATCH_SPANS, SpanDecision, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
 };
 pub(super) use work_derivatives::{Basis, WorkDerivatives};
 use works::Works;
+
+/// Shortcuts of a span, which are screened, searched and planned together. Chosen: enough to hide the latency of roots and quotients, few enough to
+/// fill.
+const SPAN_SHORTCUTS: usize = 32;
+
+/// One value for each shortcut of a span.
+type PerShortcut = [f64; SPAN_SHORTCUTS];
 
 /// The work landscape of one transition and duration over the plane of `(alpha_2, alpha_3)`.
 #[derive(Debug, Clone)]
 pub struct Landscape {
     law: Law,
-    state: StateLaw,
+    pub(super) state: StateLaw,
     friction: FrictionTerms,
     floors: FrictionBounds,
-    ends: Ends,
+    /// The data common to all shortcuts.
+    pub(super) ends: Ends,
     t_f: f64,
     ln_t_f: f64,
     /// Work that depends on the ends alone.
@@ -97,22 +105,11 @@ impl Landscape {
         }
     }
 
-    /// The shortcut with these scaled coefficients of 32 digits.
-    pub(super) fn path(&self, a_2: DoubleDouble, a_3: DoubleDouble) -> Path<'_> {
-        Path::exact(&self.ends, a_2, a_3)
-    }
-
-    /// The data common to all shortcuts.
-    pub(super) fn ends(&self) -> &Ends {
-        &self.ends
-    }
-
     /// The motion of the shortcut with these scaled coefficients, under a form of friction; `None` if it is infeasible.
     pub fn motion(&self, a_2: f64, a_3: f64, friction: Friction) -> Option<Box<dyn Motion>> {
-        let mut status = [Status::Infeasible];
-        self.evaluate(&[a_2], &[a_3], LandscapeBuffers { work: &mut [], v_min: &mut [], status: &mut status });
-        let motion = motion::CubicPoint::new(self.clone(), [a_2, a_3], friction);
-        (status != [Status::Infeasible]).then(|| Box::new(motion) as Box<dyn Motion>)
+        let is_feasible = Path::new(&self.ends, a_2, a_3).exact_status() != Status::Infeasible;
+        let motion = motion::CubicPoint { of: self.clone(), place: [a_2, a_3], friction };
+        is_feasible.then(|| Box::new(motion) as Box<dyn Motion>)
     }
 
     /// Evaluates the shortcuts with the scaled coefficients `a_2[i] = alpha_2 t_f` and `a_3[i] = alpha_3 t_f^2`.
@@ -131,7 +128,7 @@ impl Landscape {
             of: self,
             status,
             v_min: &mut v_min[..velocities],
-            open: Queue::EMPTY,
+            open: Queue::default(),
             works: Works::new(self, &mut work[..works], &mut bins),
             doubtful: Vec::new(),
         };
@@ -159,15 +156,10 @@ impl Landscape {
         let stats = works.finish();
         // Up to this point the status determines on which side of v = 1 a velocity is.
         for open in doubtful {
-            open.decide(self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
+            decide(open, self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
         }
         bins.keep();
         stats
-    }
-
-    /// The evolution law of the state.
-    pub(super) fn state(&self) -> StateLaw {
-        self.state
     }
 
     /// The work of a feasible shortcut.
@@ -219,10 +211,10 @@ struct Evaluation<'a> {
     status: &'a mut [Status],
     v_min: &'a mut [f64],
     /// Shortcuts whose least velocity is not certain to be at an end.
-    open: Queue<SEARCH_SHORTCUTS>,
+    open: Queue,
     works: Works<'a>,
-    /// Shortcuts with possibly negative friction.
-    doubtful: Vec<UndecidedShortcuts>,
+    /// Shortcuts with possibly negative friction: spans, which are on a line in the plane, and single ones.
+    doubtful: Vec<Range<usize>>,
 }
 
 impl Evaluation<'_> {
@@ -231,8 +223,8 @@ impl Evaluation<'_> {
     fn span(
         &mut self,
         first: usize,
-        a_2: &[f64; SPAN_SHORTCUTS],
-        a_3: &[f64; SPAN_SHORTCUTS],
+        a_2: &PerShortcut,
+        a_3: &PerShortcut,
         SpanDecision { status, sound }: SpanDecision,
     ) {
         self.status[first..first + SPAN_SHORTCUTS].fill(status);
@@ -240,7 +232,7 @@ impl Evaluation<'_> {
             return;
         }
         if !sound {
-            self.doubtful.push(UndecidedShortcuts { first, count: SPAN_SHORTCUTS, line: true });
+            self.doubtful.push(first..first + SPAN_SHORTCUTS);
         }
         if first < self.v_min.len() {
             self.velocities_of_span(first, a_2, a_3);
@@ -263,7 +255,7 @@ impl Evaluation<'_> {
         }
         let unsure = self.of.floors.open(ends, &a_2_lanes, &a_3_lanes, &found);
         let unsure = block.clone().enumerate().filter(|(lane, _)| unsure & (1 << lane) != 0);
-        self.doubtful.extend(unsure.map(|(_, first)| UndecidedShortcuts { first, count: 1, line: false }));
+        self.doubtful.extend(unsure.map(|(_, i)| i..i + 1));
         if first < self.v_min.len() {
             let mut least = [0.0; LANES];
             let left = end_velocities(ends, &a_2_lanes, &a_3_lanes, &found, &mut least);
@@ -281,7 +273,7 @@ impl Evaluation<'_> {
 
     /// Writes the least velocities of a span of feasible shortcuts with one status; uncertain ones are queued.
     #[inline(always)]
-    fn velocities_of_span(&mut self, first: usize, a_2: &[f64; SPAN_SHORTCUTS], a_3: &[f64; SPAN_SHORTCUTS]) {
+    fn velocities_of_span(&mut self, first: usize, a_2: &PerShortcut, a_3: &PerShortcut) {
         let (ends, status) = (&self.of.ends, self.status[first]);
         let wanted = &mut self.v_min[first..];
         let left = match wanted.first_chunk_mut() {

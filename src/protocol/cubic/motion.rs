@@ -7,20 +7,15 @@ use crate::model::{Friction, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 
-/// The motion of one shortcut; its parameter is `x = t/t_f`.
+/// The motion of one feasible shortcut; its parameter is `x = t/t_f`.
 pub(super) struct CubicPoint {
-    of: Landscape,
+    pub of: Landscape,
     /// `alpha_2 t_f` and `alpha_3 t_f^2`.
-    place: [f64; 2],
-    friction: Friction,
+    pub place: [f64; 2],
+    pub friction: Friction,
 }
 
 impl CubicPoint {
-    /// The motion of a feasible shortcut of a landscape, with `alpha_2 t_f` and `alpha_3 t_f^2`.
-    pub fn new(of: Landscape, place: [f64; 2], friction: Friction) -> CubicPoint {
-        CubicPoint { of, place, friction }
-    }
-
     fn path(&self) -> Path<'_> {
         Path::new(&self.of.ends, self.place[0], self.place[1])
     }

@@ -4,9 +4,8 @@
 //! panels are those of an ageing path of the duration `c t_f` ([`Ends::under`]). At the zeros of `n` the integrand has a square root in place of a
 //! logarithm. Under the slip law `tau v = T v - a theta'/theta` with `T = 1 + (b - a) ln theta`, so that the work needs no logarithm of the velocity.
 
-use super::least_velocity::{Least, NEAR_ZERO, near_slip_velocities, prz_velocities, slip_velocities};
+use super::least_velocity::{Least, NEAR_ZERO, least_velocities};
 use super::path::Path;
-use super::product::NearSlip;
 use super::rules::MappedPanel;
 use super::screen::screen;
 use super::works::Works;
@@ -14,7 +13,7 @@ use super::{Bins, Landscape, LandscapeBuffers};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::numerics::lambert::above_branch;
-use crate::numerics::lanes::{LANES, Lanes, Vector};
+use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::root::crossing;
 use crate::protocol::{SolverStats, Status};
 
@@ -62,14 +61,7 @@ impl Landscape {
     /// The least velocities of feasible shortcuts; others are meaningless.
     fn least_velocities(&self, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) -> Lanes {
         let wanted = found.map(|found| if found == Status::Infeasible { 0.0 } else { 1.0 });
-        let Least { mut v, place, doubt, lossy } = match self.state {
-            StateLaw::Slip => {
-                let c = [Vector(*a_2), Vector(*a_3), self.ends.rise.high - (Vector(*a_2) + Vector(*a_3))];
-                let search = if NearSlip::holds(self.ends.t_f, c) { near_slip_velocities } else { slip_velocities };
-                search(&self.ends, a_2, a_3, &wanted)
-            }
-            _ => prz_velocities(&self.ends, a_2, a_3, &wanted),
-        };
+        let Least { mut v, place, doubt, lossy } = least_velocities(self.state, &self.ends, a_2, a_3, &wanted);
         for i in (0..LANES).filter(|&i| wanted[i] * (doubt[i] + lossy[i]) > 0.0) {
             let path = Path::new(&self.ends, a_2[i], a_3[i]);
             let inside = if doubt[i] > 0.0 { self.minima(&path, 1.0, -1.0) } else { vec![place[i]] };
@@ -95,14 +87,14 @@ impl Landscape {
 
     /// By how much the lack exceeds that of `v = 1`.
     fn excess(&self, path: &Path, x: f64) -> f64 {
-        path.n().at(x) / self.ends.t_f - self.state.lack(path.theta().at(x))[0]
+        path.n.at(x) / self.ends.t_f - self.state.lack(path.theta.at(x))[0]
     }
 
     /// The ends, and the places at which the excess is least within its neighbourhood.
     fn slow_places(&self, path: &Path) -> impl Iterator<Item = f64> {
         let trend = |x: f64| {
-            let (slope, bend) = slopes(&path.theta().c, x);
-            -bend / self.ends.t_f - self.state.lack(path.theta().at(x))[1] * slope
+            let (slope, bend) = slopes(&path.theta.c, x);
+            -bend / self.ends.t_f - self.state.lack(path.theta.at(x))[1] * slope
         };
         minima(trend, even_places().collect()).into_iter().chain([0.0, 1.0])
     }
@@ -139,8 +131,8 @@ impl Landscape {
             return half(0.0).chain(half(1.0)).collect();
         }
         let trend = |x: f64| {
-            let (theta, (slope, bend)) = (path.theta().at(x), slopes(&path.theta().c, x));
-            let lack = (path.n().at(x) / self.ends.t_f).max(0.0);
+            let (theta, (slope, bend)) = (path.theta.at(x), slopes(&path.theta.c, x));
+            let lack = (path.n.at(x) / self.ends.t_f).max(0.0);
             q * slope * self.ends.t_f * (lack - 1.0 + above_branch(lack)) - p * theta * bend
         };
         // Denser towards both ends, where theta may be small.

@@ -16,11 +16,11 @@ use super::product::{Ageing, NearSlip, Product, Prz, Slip};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::{MAX_HALF, Primitive, ROWS};
-use crate::numerics::lanes::{LANES, Lanes, Vector, choose, least};
+use crate::numerics::lanes::{Lanes, Vector, choose, least};
 
 /// Panels of eight shortcuts with equal numbers of nodes, each with its map `delta = side (gap - s^(2^squarings))` of the distance from an end
 /// of the panel.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PanelBatch {
     pub a_2: Lanes,
     pub a_3: Lanes,
@@ -88,7 +88,7 @@ impl NodeBuffer {
 }
 
 /// The constants of a bundle for all its nodes. Positions are given by `eta = gap - s^(2^squarings) = side delta`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Prepared {
     /// Coefficients of theta and of n in powers of `eta`.
     pub theta: [Vector; 4],
@@ -115,53 +115,13 @@ pub(super) struct Prepared {
 }
 
 /// The selection of a kernel for a batch, by its least and greatest power.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 enum Kernel {
     Squares,
     Square,
     Fourth,
+    #[default]
     Eighth,
-}
-
-impl Prepared {
-    /// The constants of an empty bundle.
-    pub const EMPTY: Prepared = {
-        let none = Vector::splat(0.0);
-        Prepared {
-            theta: [none; 4],
-            n: [none; 3],
-            slope: [none; 2],
-            drive: none,
-            tau: none,
-            kernel: Kernel::Eighth,
-            gap: none,
-            squarings: none,
-            middle: none,
-            half: none,
-            unit: none,
-            scale: none,
-            inverse_time: none,
-            near: false,
-        }
-    };
-}
-
-impl PanelBatch {
-    /// A batch without shortcuts.
-    pub const EMPTY: PanelBatch = {
-        let none = [0.0; LANES];
-        PanelBatch {
-            a_2: none,
-            a_3: none,
-            low: none,
-            high: none,
-            side: none,
-            gap: none,
-            squarings: none,
-            from: none,
-            to: none,
-        }
-    };
 }
 
 impl Prepared {

@@ -25,18 +25,14 @@ pub(in crate::protocol) struct Ends {
 }
 
 impl Ends {
-    /// The ends of shortcuts between the steady states at `v_i` and `v_f`; velocities need a relative accuracy of `v_loss`.
-    pub fn between(v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
+    /// The ends of shortcuts between the steady states at `v_i` and `v_f` under an evolution law of the state; velocities need a relative accuracy of
+    /// `v_loss`. In the time `c t_f`, with the fastest rise `c`, an ageing path has the theta of a path under the law, and `n = c t_f (1 - theta'/c)`:
+    /// feasible sets and zeros are the same.
+    pub fn under(state: StateLaw, v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
         let one = DoubleDouble::new(1.0);
         let (theta_0, theta_1) = (one / DoubleDouble::new(v_i), one / DoubleDouble::new(v_f));
-        Ends { theta_0, theta_1, rise: rise(v_i, v_f), t_f, t_low: 0.0, v_loss }
-    }
-
-    /// The ends of shortcuts under an evolution law of the state. In the time `c t_f`, with the fastest rise `c`, an ageing path has the theta of a
-    /// path under the law, and `n = c t_f (1 - theta'/c)`: feasible sets and zeros are the same.
-    pub fn under(state: StateLaw, v_i: f64, v_f: f64, t_f: f64, v_loss: f64) -> Ends {
         let scaled = DoubleDouble::new(t_f) * state.fastest_rise();
-        Ends { t_f: scaled.high, t_low: scaled.low, ..Ends::between(v_i, v_f, t_f, v_loss) }
+        Ends { theta_0, theta_1, rise: rise(v_i, v_f), t_f: scaled.high, t_low: scaled.low, v_loss }
     }
 }
 
@@ -49,14 +45,12 @@ pub(in crate::protocol) fn rise(v_i: f64, v_f: f64) -> DoubleDouble {
 #[derive(Debug, Clone, Copy)]
 pub(in crate::protocol) struct Path<'a> {
     pub ends: &'a Ends,
-    a_2: f64,
-    a_3: f64,
-    /// The low words of the coefficients.
+    /// The low words of the coefficients of `x` and `x^2`.
     low: [f64; 2],
     /// `theta` in powers of `x`.
-    theta: Cubic,
+    pub theta: Cubic,
     /// `n` in powers of `x`.
-    n: Cubic,
+    pub n: Cubic,
 }
 
 impl<'a> Path<'a> {
@@ -66,8 +60,6 @@ impl<'a> Path<'a> {
         let a_4 = ends.rise.high - a_2 - a_3;
         Path {
             ends,
-            a_2,
-            a_3,
             low: [0.0; 2],
             theta: Cubic { c: [ends.theta_0.high, a_2, a_3, a_4] },
             n: Cubic { c: [ends.t_f - a_2, -2.0 * a_3, -3.0 * a_4, 0.0] },
@@ -84,22 +76,14 @@ impl<'a> Path<'a> {
     /// The rounding error of `A_4`, a small difference if `A_2 + A_3` is close to the rise.
     #[inline(always)]
     pub fn slack(&self) -> f64 {
-        f64::EPSILON * (self.ends.rise.high.abs() + self.a_2.abs() + self.a_3.abs())
-    }
-
-    /// `n` in powers of `x`.
-    pub fn n(&self) -> &Cubic {
-        &self.n
-    }
-
-    /// `theta` in powers of `x`.
-    pub fn theta(&self) -> &Cubic {
-        &self.theta
+        let [_, a_2, a_3, _] = self.theta.c;
+        f64::EPSILON * (self.ends.rise.high.abs() + a_2.abs() + a_3.abs())
     }
 
     /// `theta(x)` to 32 digits.
     pub fn exact_theta(&self) -> ExactCubic {
-        let (a_2, a_3) = (DoubleDouble::sum(self.a_2, self.low[0]), DoubleDouble::sum(self.a_3, self.low[1]));
+        let [_, a_2, a_3, _] = self.theta.c;
+        let (a_2, a_3) = (DoubleDouble::sum(a_2, self.low[0]), DoubleDouble::sum(a_3, self.low[1]));
         ExactCubic { c: [self.ends.theta_0, a_2, a_3, self.ends.rise - a_2 - a_3] }
     }
 
@@ -172,7 +156,7 @@ impl<'a> Path<'a> {
     /// The coefficients of theta and of n in powers of `x - 1`.
     #[inline(always)]
     pub fn about_end(&self) -> ([f64; 4], [f64; 3]) {
-        let (a_2, a_3, rise) = (self.a_2, self.a_3, self.ends.rise.high);
+        let ([_, a_2, a_3, _], rise) = (self.theta.c, self.ends.rise.high);
         let slope = 3.0 * rise - 2.0 * a_2 - a_3;
         let bend = 3.0 * rise - 3.0 * a_2 - 2.0 * a_3;
         let a_4 = rise - a_2 - a_3;
@@ -260,11 +244,14 @@ impl<'a> Path<'a> {
         n <= most * theta
     }
 
+    /// The velocity at `x`, from coefficients of 32 digits.
+    fn velocity(&self, x: f64) -> f64 {
+        (self.exact_n().at(x) / (DoubleDouble::new(self.ends.t_f) * self.exact_theta().at(x))).high
+    }
+
     /// The least velocity, from coefficients of 32 digits.
     pub fn least_velocity(&self) -> f64 {
-        let t_f = DoubleDouble::new(self.ends.t_f);
-        let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
-        let place = if at(1.0) < at(0.0) { 1.0 } else { 0.0 };
+        let place = if self.velocity(1.0) < self.velocity(0.0) { 1.0 } else { 0.0 };
         self.exact_velocity(place)
     }
 
@@ -284,11 +271,9 @@ impl<'a> Path<'a> {
     /// In double precision the velocity is flat within rounding, so its minimum is known to half the digits only. Dinkelbach's step uses the
     /// stationary point of a cubic instead, which has all digits.
     pub fn exact_velocity(&self, x: f64) -> f64 {
-        let t_f = DoubleDouble::new(self.ends.t_f);
-        let at = |x: f64| (self.exact_n().at(x) / (t_f * self.exact_theta().at(x))).high;
-        let mut v = at(x);
+        let mut v = self.velocity(x);
         for _ in 0..MAX_STEPS {
-            let lower = at(self.exact_surplus(v).minimum());
+            let lower = self.velocity(self.exact_surplus(v).minimum());
             if lower.is_nan() || lower >= v || lower <= 0.0 {
                 break;
             }

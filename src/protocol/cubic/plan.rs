@@ -9,16 +9,18 @@ use multiversion::multiversion;
 use super::bins::BINS;
 use super::path::{Ends, Path};
 use super::rules::{
-    MAX_ZERO_DISTANCE, MIN_THIRD, NODE_STEP, NodeThresholds, THETA_ZEROS, ZEROS, cut, is_near_start, polished,
-    rough_zeros,
+    MAX_CHEAP_NODES, MAX_ZERO_DISTANCE, MIN_THIRD, NODE_STEP, NodeThresholds, THETA_ZEROS, ZEROS, cut, is_near_start,
+    polished, rough_zeros,
 };
+use super::{PerShortcut, SPAN_SHORTCUTS};
+use crate::numerics::lanes::LANES;
 use crate::numerics::real::Real;
 
 /// One panel for each shortcut.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PlannedPanels {
     /// The bin of the number of nodes; none from [`BINS`] on.
-    pub bin: [u32; PLANNED_SHORTCUTS],
+    pub bin: [u32; SPAN_SHORTCUTS],
     /// log2 of the power.
     pub squarings: PerShortcut,
     /// The end of the panel at which the map begins: +1 the upper, -1 the lower.
@@ -34,37 +36,11 @@ pub(super) struct PlannedPanels {
     pub cut: PerShortcut,
 }
 
-impl PlannedPanels {
-    /// An empty plan.
-    pub const EMPTY: PlannedPanels = {
-        let none = [0.0; PLANNED_SHORTCUTS];
-        PlannedPanels {
-            bin: [0; PLANNED_SHORTCUTS],
-            squarings: none,
-            side: none,
-            gap: none,
-            from: none,
-            to: none,
-            deeper: none,
-            cut: none,
-        }
-    };
-}
-
-/// Shortcuts that are planned together. Chosen: enough to hide the latency of square roots, few enough to fill.
-pub(super) const PLANNED_SHORTCUTS: usize = 32;
-
-/// Single precision numbers of the widest vectors. Derived: 512 bits.
-const SINGLE_LANES: usize = 16;
-
-/// One value for each shortcut.
-pub(super) type PerShortcut = [f64; PLANNED_SHORTCUTS];
+/// Single precision numbers of the widest vectors. Derived: half as long as doubles.
+const SINGLE_LANES: usize = 2 * LANES;
 
 /// log2 of the greatest power. Chosen: the powers 2, 4 and 8 of docs/numerical-methods.md.
 pub(super) const MAX_SQUARINGS: u32 = 3;
-
-/// Number of nodes of which a larger power cannot save many. Measured (`cargo bench --bench landscape`).
-pub(super) const MAX_CHEAP_NODES: usize = 32;
 
 /// Least half distance of a pair of zeros of n that is known to some digits. Derived: the root of the rounding of the discriminant, times 100.
 const MIN_PAIR: f64 = 1e-6;
@@ -110,7 +86,7 @@ pub(super) fn plan(
     accuracy: &NodeThresholds,
     plan: &mut PlannedPanels,
 ) {
-    panels::<f32, 1>(ends, [a_2, a_3, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]], accuracy, plan);
+    panels::<f32, 1>(ends, [a_2, a_3, &[0.0; SPAN_SHORTCUTS], &[1.0; SPAN_SHORTCUTS]], accuracy, plan);
 }
 
 /// Chooses panels over `[low[i], high[i]]` with all powers; one bound is an end of `[0, 1]`.
@@ -124,25 +100,25 @@ pub(super) fn plan_parts(ends: &Ends, parts: [&PerShortcut; 4], accuracy: &NodeT
 
 /// The zeros of theta and of n of each shortcut in the closed upper half plane; a conjugate pair occurs once.
 pub(super) struct Places<T> {
-    pub re: [[T; PLANNED_SHORTCUTS]; ZEROS],
-    pub im: [[T; PLANNED_SHORTCUTS]; ZEROS],
+    pub re: [[T; SPAN_SHORTCUTS]; ZEROS],
+    pub im: [[T; SPAN_SHORTCUTS]; ZEROS],
     /// Above 0 where the zeros are too inaccurate for a plan.
-    pub doubt: [f32; PLANNED_SHORTCUTS],
+    pub doubt: [f32; SPAN_SHORTCUTS],
 }
 
 /// The zeros of the shortcuts `(a_2[i], a_3[i])`.
 #[inline(always)]
 pub(super) fn places<T: Real>(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> Places<T> {
     let zero = T::of(0.0);
-    let [mut q0, mut q1, mut q2, mut q3, mut n0, mut n1, mut n2] = [[zero; PLANNED_SHORTCUTS]; 7];
-    for i in 0..PLANNED_SHORTCUTS {
+    let [mut q0, mut q1, mut q2, mut q3, mut n0, mut n1, mut n2] = [[zero; SPAN_SHORTCUTS]; 7];
+    for i in 0..SPAN_SHORTCUTS {
         let (theta, n) = Path::new(ends, a_2[i], a_3[i]).about_end();
         (q0[i], q1[i], q2[i], q3[i]) = (T::of(theta[0]), T::of(theta[1]), T::of(theta[2]), T::of(theta[3]));
         (n0[i], n1[i], n2[i]) = (T::of(n[0]), T::of(n[1]), T::of(n[2]));
     }
-    let (mut re, mut im) = ([[zero; PLANNED_SHORTCUTS]; ZEROS], [[zero; PLANNED_SHORTCUTS]; ZEROS]);
-    let mut doubt = [0.0f32; PLANNED_SHORTCUTS];
-    for i in 0..PLANNED_SHORTCUTS {
+    let (mut re, mut im) = ([[zero; SPAN_SHORTCUTS]; ZEROS], [[zero; SPAN_SHORTCUTS]; ZEROS]);
+    let mut doubt = [0.0f32; SPAN_SHORTCUTS];
+    for i in 0..SPAN_SHORTCUTS {
         let theta = [q0[i], q1[i], q2[i], q3[i]];
         let n = [n0[i], n1[i], n2[i]];
         let zeros = rough_zeros(theta, n);
@@ -162,7 +138,7 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut)
     places.settle_close_pairs(ends, a_2, a_3);
     // A pair is counted once.
     for k in PAIRS {
-        for i in 0..PLANNED_SHORTCUTS {
+        for i in 0..SPAN_SHORTCUTS {
             let (place, height) = (places.re[k + 1][i], places.im[k + 1][i]);
             places.re[k + 1][i] = if height > zero { T::of(MAX_ZERO_DISTANCE) } else { place };
             places.im[k + 1][i] = zero;
@@ -176,13 +152,13 @@ impl<T: Real> Places<T> {
     #[inline(always)]
     fn polish_near_start(&mut self, ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) {
         let Places { re, im, doubt } = self;
-        let mut close = [0.0f32; PLANNED_SHORTCUTS];
+        let mut close = [0.0f32; SPAN_SHORTCUTS];
         for k in 0..ZEROS {
-            for i in 0..PLANNED_SHORTCUTS {
+            for i in 0..SPAN_SHORTCUTS {
                 close[i] += if is_near_start(re[k][i], im[k][i]) { 1.0 } else { 0.0 };
             }
         }
-        for i in (0..PLANNED_SHORTCUTS).filter(|&i| close[i] > 0.0) {
+        for i in (0..SPAN_SHORTCUTS).filter(|&i| close[i] > 0.0) {
             for k in 0..ZEROS {
                 if is_near_start(re[k][i], im[k][i]) {
                     let (theta, [n0, n1, n2]) = Path::new(ends, a_2[i], a_3[i]).about_start();
@@ -204,12 +180,12 @@ impl<T: Real> Places<T> {
         for k in 0..ZEROS {
             let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THIRD } else { MIN_PAIR });
             let weight = if k < THETA_ZEROS { 1.0 } else { N_DOUBT_WEIGHT };
-            for i in 0..PLANNED_SHORTCUTS {
+            for i in 0..SPAN_SHORTCUTS {
                 let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
                 doubt[i] += if close { weight } else { 0.0 };
             }
         }
-        for i in 0..PLANNED_SHORTCUTS {
+        for i in 0..SPAN_SHORTCUTS {
             let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < N_DOUBT_WEIGHT;
             let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
             if let Some((x, height, reach)) = pair {
@@ -228,16 +204,16 @@ impl<T: Real> Places<T> {
 /// projection onto the real axis.
 #[inline(always)]
 pub(super) fn nearest<T: Real>(
-    re: &[[T; PLANNED_SHORTCUTS]; ZEROS],
-    im: &[[T; PLANNED_SHORTCUTS]; ZEROS],
+    re: &[[T; SPAN_SHORTCUTS]; ZEROS],
+    im: &[[T; SPAN_SHORTCUTS]; ZEROS],
     low: &PerShortcut,
     high: &PerShortcut,
-) -> ([f32; PLANNED_SHORTCUTS], [T; PLANNED_SHORTCUTS]) {
+) -> ([f32; SPAN_SHORTCUTS], [T; SPAN_SHORTCUTS]) {
     // The limiting zero determines the end and the centre. Single precision suffices for comparisons; positions of zeros keep all digits.
-    let mut shadow = [T::of(0.0); PLANNED_SHORTCUTS];
-    let mut least = [f32::MAX; PLANNED_SHORTCUTS];
+    let mut shadow = [T::of(0.0); SPAN_SHORTCUTS];
+    let mut least = [f32::MAX; SPAN_SHORTCUTS];
     for k in 0..ZEROS {
-        for i in 0..PLANNED_SHORTCUTS {
+        for i in 0..SPAN_SHORTCUTS {
             let (u, v) = ((re[k][i] - T::of(low[i])).narrow(), (re[k][i] - T::of(high[i])).narrow());
             let y = im[k][i].narrow();
             let (u_square, v_square) = (u * u + y * y, v * v + y * y);
@@ -276,9 +252,9 @@ fn panels<T: Real, const SQUARINGS: u32>(
     let Places { re, im, mut doubt } = places::<T>(ends, a_2, a_3);
     // The plain rule, and end and centre of a possibly better map.
     let (least, shadow) = nearest(&re, &im, low, high);
-    let mut focal = [0.0f32; PLANNED_SHORTCUTS];
-    let (mut side, mut gap) = ([zero; PLANNED_SHORTCUTS], [zero; PLANNED_SHORTCUTS]);
-    for i in 0..PLANNED_SHORTCUTS {
+    let mut focal = [0.0f32; SPAN_SHORTCUTS];
+    let (mut side, mut gap) = ([zero; SPAN_SHORTCUTS], [zero; SPAN_SHORTCUTS]);
+    for i in 0..SPAN_SHORTCUTS {
         let (low, high) = (T::of(low[i]), T::of(high[i]));
         focal[i] = 2.0 * least[i].sqrt() / (high - low).narrow();
         let upper = shadow[i] + shadow[i] > low + high;
@@ -287,9 +263,9 @@ fn panels<T: Real, const SQUARINGS: u32>(
         gap[i] = if beyond > zero { beyond } else { zero };
     }
     // Real part and modulus of a zero determine its distances from real points.
-    let (mut real, mut size) = ([[0.0f32; PLANNED_SHORTCUTS]; ZEROS], [[0.0f32; PLANNED_SHORTCUTS]; ZEROS]);
+    let (mut real, mut size) = ([[0.0f32; SPAN_SHORTCUTS]; ZEROS], [[0.0f32; SPAN_SHORTCUTS]; ZEROS]);
     for k in 0..ZEROS {
-        for i in 0..PLANNED_SHORTCUTS {
+        for i in 0..SPAN_SHORTCUTS {
             let end = if side[i] > zero { T::of(high[i]) - re[k][i] } else { re[k][i] - T::of(low[i]) };
             let (x, y) = ((gap[i] + end).narrow(), im[k][i].narrow());
             real[k][i] = x;
@@ -297,18 +273,18 @@ fn panels<T: Real, const SQUARINGS: u32>(
         }
     }
     // A zero beyond the end is given by its distance from 1.
-    for i in 0..PLANNED_SHORTCUTS {
+    for i in 0..SPAN_SHORTCUTS {
         let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(MIN_GAP));
         doubt[i] += if blurred { N_DOUBT_WEIGHT } else { 0.0 };
     }
     // A focal sum is reduced by the possible error of the zeros.
     let lost = if is_coarse::<T>() { SINGLE_PRECISION_ERROR } else { 0.0 };
-    let steps = accuracy.in_steps();
+    let steps = &accuracy.focal;
     let limits: [f32; BINS] = std::array::from_fn(|i| (steps[i] + lost * (steps[i] - 2.0)) as f32);
     let cheap = limits[MAX_CHEAP_NODES / NODE_STEP - 1];
     let Powers { squarings, short } = powers::<T, SQUARINGS>([real, size], &gap, [low, high], cheap, &mut focal);
     let bin = bins(&limits, &focal);
-    for i in 0..PLANNED_SHORTCUTS {
+    for i in 0..SPAN_SHORTCUTS {
         let (low, high) = (low[i], high[i]);
         let length = high - low;
         plan.cut[i] = cut(low, high, shadow[i].wide());
@@ -327,7 +303,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
         let sound = Path::new(ends, a_2[i], a_3[i]).is_sound(centre > 0.0, near, near - side * length, accuracy);
         plan.bin[i] = if sound & (doubt[i] == 0.0) { bin[i] as u32 } else { BINS as u32 };
     }
-    for i in 0..PLANNED_SHORTCUTS {
+    for i in 0..SPAN_SHORTCUTS {
         plan.deeper[i] = if (short[i] > 0.0) | (is_coarse::<T>() & (doubt[i] > 0.0)) { 1.0 } else { 0.0 };
     }
     map_bounds::<SQUARINGS>(plan, &squarings);
@@ -335,7 +311,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
 
 /// Maps the bounds of the panels to the variables of their powers.
 #[inline(always)]
-fn map_bounds<const SQUARINGS: u32>(plan: &mut PlannedPanels, squarings: &[f32; PLANNED_SHORTCUTS]) {
+fn map_bounds<const SQUARINGS: u32>(plan: &mut PlannedPanels, squarings: &[f32; SPAN_SHORTCUTS]) {
     for level in 1..=SQUARINGS {
         for ((from, to), &squarings) in plan.from.iter_mut().zip(&mut plan.to).zip(squarings) {
             let more = squarings >= level as f32;
@@ -348,48 +324,48 @@ fn map_bounds<const SQUARINGS: u32>(plan: &mut PlannedPanels, squarings: &[f32; 
 /// The powers of the maps.
 struct Powers {
     /// log2 of the powers.
-    squarings: [f32; PLANNED_SHORTCUTS],
+    squarings: [f32; SPAN_SHORTCUTS],
     /// 1 where a larger power might save nodes.
-    short: [f32; PLANNED_SHORTCUTS],
+    short: [f32; SPAN_SHORTCUTS],
 }
 
 /// The power of each map from the real parts and moduli of the zeros relative to its centre; increases `focal` where a power helps. Powers
 /// beyond the square are tried where the sum is not `cheap`.
 #[inline(always)]
 fn powers<T: Real, const SQUARINGS: u32>(
-    [mut real, mut size]: [[[f32; PLANNED_SHORTCUTS]; ZEROS]; 2],
-    gap: &[T; PLANNED_SHORTCUTS],
+    [mut real, mut size]: [[[f32; SPAN_SHORTCUTS]; ZEROS]; 2],
+    gap: &[T; SPAN_SHORTCUTS],
     [low, high]: [&PerShortcut; 2],
     cheap: f32,
-    focal: &mut [f32; PLANNED_SHORTCUTS],
+    focal: &mut [f32; SPAN_SHORTCUTS],
 ) -> Powers {
     let (mut near, mut far) = (*gap, *gap);
-    for i in 0..PLANNED_SHORTCUTS {
+    for i in 0..SPAN_SHORTCUTS {
         far[i] = gap[i] + (T::of(high[i]) - T::of(low[i]));
     }
-    let mut squarings = [0.0f32; PLANNED_SHORTCUTS];
+    let mut squarings = [0.0f32; SPAN_SHORTCUTS];
     // Upper bound of the focal sum by the centre of the map, which is mapped to 0.
-    let mut ceiling = [2.0f32; PLANNED_SHORTCUTS];
+    let mut ceiling = [2.0f32; SPAN_SHORTCUTS];
     for level in 1..=SQUARINGS {
         if level > 1 && focal.iter().all(|&focal| focal >= cheap) {
             break;
         }
-        let (mut a, mut b) = ([0.0f32; PLANNED_SHORTCUTS], [0.0f32; PLANNED_SHORTCUTS]);
-        for i in 0..PLANNED_SHORTCUTS {
+        let (mut a, mut b) = ([0.0f32; SPAN_SHORTCUTS], [0.0f32; SPAN_SHORTCUTS]);
+        for i in 0..SPAN_SHORTCUTS {
             near[i] = near[i].sqrt();
             far[i] = far[i].sqrt();
             (a[i], b[i]) = (near[i].narrow(), far[i].narrow());
         }
-        let mut least = [f32::MAX; PLANNED_SHORTCUTS];
+        let mut least = [f32::MAX; SPAN_SHORTCUTS];
         for k in 0..ZEROS {
-            for i in 0..PLANNED_SHORTCUTS {
+            for i in 0..SPAN_SHORTCUTS {
                 let square = size[k][i];
                 let (x, sum) = rooted(square, real[k][i], a[i], b[i]);
                 (real[k][i], size[k][i]) = (x, square.sqrt());
                 least[i] = if sum < least[i] { sum } else { least[i] };
             }
         }
-        for i in 0..PLANNED_SHORTCUTS {
+        for i in 0..SPAN_SHORTCUTS {
             let reached = 2.0 * least[i].sqrt() / (b[i] - a[i]);
             // A square costs no more than a plain rule, but differences from a distant centre lose digits.
             let open = if level == 1 { gap[i].narrow() <= (high[i] - low[i]) as f32 } else { focal[i] < cheap };
@@ -399,8 +375,8 @@ fn powers<T: Real, const SQUARINGS: u32>(
             ceiling[i] = 2.0 * (a[i] + b[i]) / (b[i] - a[i]);
         }
     }
-    let mut short = [0.0f32; PLANNED_SHORTCUTS];
-    for i in 0..PLANNED_SHORTCUTS {
+    let mut short = [0.0f32; SPAN_SHORTCUTS];
+    for i in 0..SPAN_SHORTCUTS {
         // A larger power increases the distance from the centre, but hardly from other zeros.
         let near = focal[i] - 2.0 > 0.5 * (ceiling[i] - 2.0);
         short[i] = if (focal[i] < cheap) & (squarings[i] == SQUARINGS as f32) & near { 1.0 } else { 0.0 };
@@ -410,8 +386,8 @@ fn powers<T: Real, const SQUARINGS: u32>(
 
 /// The number of descending limits above each focal sum.
 #[inline(always)]
-fn bins(limits: &[f32; BINS], focal: &[f32; PLANNED_SHORTCUTS]) -> [f32; PLANNED_SHORTCUTS] {
-    let mut bin = [0.0f32; PLANNED_SHORTCUTS];
+fn bins(limits: &[f32; BINS], focal: &[f32; SPAN_SHORTCUTS]) -> [f32; SPAN_SHORTCUTS] {
+    let mut bin = [0.0f32; SPAN_SHORTCUTS];
     for (bins, focals) in bin.chunks_exact_mut(SINGLE_LANES).zip(focal.chunks_exact(SINGLE_LANES)) {
         let mut counts = [0.0f32; SINGLE_LANES];
         for limit in limits {

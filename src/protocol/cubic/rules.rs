@@ -7,11 +7,13 @@
 
 use multiversion::multiversion;
 
+use super::bins::BINS;
 use super::path::Path;
 use crate::model::Law;
 use crate::numerics::cubic::{self, cubic_zeros, quadratic_zeros};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::gauss::rule;
 use crate::numerics::lanes::{LANES, Lanes, least};
 use crate::numerics::real::Real;
 
@@ -37,6 +39,29 @@ pub(super) enum PanelMap {
     },
 }
 
+impl PanelMap {
+    /// `delta` at `s`, and its derivative.
+    #[inline(always)]
+    pub fn place(self, s: f64) -> (f64, f64) {
+        match self {
+            PanelMap::Line => (s, 1.0),
+            PanelMap::Power { side, gap, squarings } => {
+                let (mut power, mut jacobian) = (s, 1.0);
+                for _ in 0..squarings {
+                    jacobian *= 2.0 * power;
+                    power *= power;
+                }
+                (side * (gap - power), jacobian)
+            }
+            PanelMap::Sinh { height } => {
+                let q = exp(s);
+                let inverse = 1.0 / q;
+                (0.5 * height * (q - inverse), 0.5 * height * (q + inverse))
+            }
+        }
+    }
+}
+
 /// One panel of a quadrature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MappedPanel {
@@ -50,14 +75,26 @@ pub(super) struct MappedPanel {
     pub nodes: usize,
 }
 
-/// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes (`cargo bench --bench
-/// landscape`).
-const MAX_PLAIN_NODES: usize = 32;
+impl MappedPanel {
+    /// Visits the distance from the centre and the weight of every node.
+    pub fn each_node(&self, mut visit: impl FnMut(f64, f64)) {
+        let rule = rule(self.nodes);
+        let (middle, half) = (0.5 * (self.from + self.to), 0.5 * (self.to - self.from));
+        for (x, w) in rule.x.iter().zip(&rule.w) {
+            let (delta, jacobian) = self.map.place(middle + half * x);
+            visit(delta, half * w * jacobian);
+        }
+    }
+}
+
+/// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes, and a larger power cannot save
+/// many (`cargo bench --bench landscape`).
+pub(super) const MAX_CHEAP_NODES: usize = 32;
 /// Number of nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay off from there on (`cargo bench --bench
 /// landscape`).
 const MIN_SINH_NODES: usize = 40;
-/// Number of nodes above which a panel is cut: that of the last bin. Derived.
-const MAX_UNCUT_NODES: usize = 80;
+/// Number of nodes above which a panel is cut: that of the last bin.
+const MAX_UNCUT_NODES: usize = BINS * NODE_STEP;
 /// Greatest number of nodes of a panel. Chosen: more than any panel needs after cuts.
 const MAX_NODES: usize = 256;
 /// Step of the number of nodes. Chosen: half of the lanes; a smaller step has more bins to fill, a larger one more spare nodes.
@@ -71,8 +108,8 @@ const LN_SAFETY_FACTOR: f64 = 3.5;
 /// The requested accuracy, as the focal sums (see [`focal`]) from which a number of nodes suffices.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct NodeThresholds {
-    /// Element `i` belongs to `(i + 1) NODE_STEP` nodes; descending.
-    focal: [f64; MAX_NODES / NODE_STEP],
+    /// The focal sums from which nodes suffice: element `i` belongs to `(i + 1) NODE_STEP` nodes; descending.
+    pub focal: [f64; MAX_NODES / NODE_STEP],
     /// ln rho from which [`NODE_STEP`] nodes suffice.
     pub pace: f64,
     /// Greatest relative error of theta.
@@ -125,12 +162,6 @@ impl NodeThresholds {
     #[inline(always)]
     pub fn enough(&self, nodes: usize) -> f64 {
         self.focal[nodes / NODE_STEP - 1]
-    }
-
-    /// The focal sums from which [`NODE_STEP`] nodes suffice, then twice as many, and so on.
-    #[inline(always)]
-    pub fn in_steps(&self) -> &[f64] {
-        &self.focal
     }
 
     /// The number of nodes for a focal sum, a multiple of [`LANES`]; `MAX_NODES` if more would be needed.
@@ -269,7 +300,7 @@ pub(super) fn choose(
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &NodeThresholds) -> (MappedPanel, f64) {
     let mut best = (line(zeros, low, high), 2.0);
-    let plain = accuracy.enough(MAX_PLAIN_NODES);
+    let plain = accuracy.enough(MAX_CHEAP_NODES);
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
     // A real zero this close excludes the plain rule without computing its ellipse.

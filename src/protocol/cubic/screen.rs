@@ -8,13 +8,12 @@ use multiversion::multiversion;
 
 use super::friction::FrictionBounds;
 use super::path::{Ends, MAX_STEPS, Path};
+use super::{PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::real::Real;
+use crate::numerics::root::LAST_STEP_RESIDUAL;
 use crate::protocol::Status;
-
-/// Shortcuts of a span, which its ends may decide. Chosen: the number that is planned together.
-pub(super) const SPAN_SHORTCUTS: usize = 32;
 
 /// Spans that are tested together, with two ends each.
 pub(super) const BATCH_SPANS: usize = LANES / 2;
@@ -142,8 +141,8 @@ fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [
 fn polynomial(ends: &Ends, a_2: f64, a_3: f64, which: usize) -> (Cubic, f64) {
     let path = Path::new(ends, a_2, a_3);
     let (cubic, slack) = match which {
-        0 => (*path.n(), 3.0 * path.slack()),
-        1 => (*path.theta(), path.slack()),
+        0 => (path.n, 3.0 * path.slack()),
+        1 => (path.theta, path.slack()),
         _ => (path.surplus(ends.t_f), (3.0 + ends.t_f) * path.slack()),
     };
     (cubic, cubic.doubt() + slack)
@@ -177,30 +176,23 @@ pub(super) fn screen(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> [Status; LANES] {
 fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Option<[Lanes; 3]> {
     let mut n = [0.0; LANES];
     for i in 0..LANES {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        let sign = sign_of_quadratic(path.n(), 3.0 * path.slack());
+        let (quadratic, doubt) = polynomial(ends, a_2[i], a_3[i], 0);
+        let sign = sign_of_quadratic(&quadratic, doubt);
         let tame = a_2[i].abs() + a_3[i].abs() < MAX_COORDINATE;
         n[i] = if tame { sign } else { -1.0 };
     }
     if n.iter().all(|&n| n < 0.0) {
         return None;
     }
-    let theta = sign(&|i| {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        (*path.theta(), path.slack())
-    });
-    let surplus = sign(&|i| {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        (path.surplus(ends.t_f), (3.0 + ends.t_f) * path.slack())
-    });
+    let theta = sign(&|i| polynomial(ends, a_2[i], a_3[i], 1));
+    let surplus = sign(&|i| polynomial(ends, a_2[i], a_3[i], 2));
     Some([n, theta, surplus])
 }
 
-/// Sign of the least value of `c[0] + c[1] x + c[2] x^2`; `slack` is the error of the coefficients beyond their own rounding.
+/// Sign of the least value of `c[0] + c[1] x + c[2] x^2`, whose rounding is `doubt`.
 #[inline(always)]
-fn sign_of_quadratic(quadratic: &Cubic, slack: f64) -> f64 {
+fn sign_of_quadratic(quadratic: &Cubic, doubt: f64) -> f64 {
     let [c0, c1, c2, _] = quadratic.c;
-    let doubt = 8.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs()) + slack;
     let x = -0.5 * c1 / c2;
     let inside = c2 > 0.0 && x > 0.0 && x < 1.0;
     let bottom = if inside { c0 + 0.5 * x * c1 } else { c0 };
@@ -208,14 +200,13 @@ fn sign_of_quadratic(quadratic: &Cubic, slack: f64) -> f64 {
     sign_of(lower(lower(c0, c0 + c1 + c2), bottom), doubt)
 }
 
-/// Signs of the least values of eight cubics, each with its slack.
+/// Signs of the least values of eight cubics, each with the rounding of its values.
 #[inline(always)]
 fn sign(cubic: &impl Fn(usize) -> (Cubic, f64)) -> Lanes {
     let mut signs = [0.0; LANES];
     for (i, sign) in signs.iter_mut().enumerate() {
-        let (cubic, slack) = cubic(i);
+        let (cubic, doubt) = cubic(i);
         let (least, greatest) = cubic.bounds();
-        let doubt = cubic.doubt() + slack;
         // Positive if all coefficients are, negative if an end is.
         *sign = if least > doubt {
             1.0
@@ -229,8 +220,8 @@ fn sign(cubic: &impl Fn(usize) -> (Cubic, f64)) -> Lanes {
         return signs;
     }
     for (i, sign) in signs.iter_mut().enumerate() {
-        let (cubic, slack) = cubic(i);
-        *sign = sign_of(cubic.least(), cubic.doubt() + slack);
+        let (cubic, doubt) = cubic(i);
+        *sign = sign_of(cubic.least(), doubt);
     }
     signs
 }
@@ -269,10 +260,10 @@ pub(super) fn end_velocities(
 ))]
 pub(super) fn end_velocities_of_span(
     ends: &Ends,
-    a_2: &[f64; SPAN_SHORTCUTS],
-    a_3: &[f64; SPAN_SHORTCUTS],
+    a_2: &PerShortcut,
+    a_3: &PerShortcut,
     status: Status,
-    v_min: &mut [f64; SPAN_SHORTCUTS],
+    v_min: &mut PerShortcut,
 ) -> u32 {
     ending(ends, a_2, a_3, &[status; SPAN_SHORTCUTS], v_min)
 }
@@ -295,7 +286,7 @@ fn ending<const N: usize>(
         let slack = path.slack();
         let doubt = surplus.doubt() + (3.0 + v * ends.t_f) * slack;
         let lost =
-            is_lossy(path.n(), 3.0 * slack, place, ends.v_loss) | is_lossy(path.theta(), slack, place, ends.v_loss);
+            is_lossy(&path.n, 3.0 * slack, place, ends.v_loss) | is_lossy(&path.theta, slack, place, ends.v_loss);
         v_min[i] = on_side(v, status[i]);
         let is_open = lost | !((first > doubt) & (second > doubt));
         open[i] = if is_open { 1u32 << i } else { 0 };
@@ -309,46 +300,34 @@ pub(super) fn on_side(v_min: f64, status: Status) -> f64 {
     if status == Status::Ok { v_min.max(1.0) } else { v_min.min(1.0 - 0.5 * f64::EPSILON) }
 }
 
-/// Shortcuts whose least velocities are searched together. Chosen: enough to hide the latency of roots and quotients.
-pub(super) const SEARCH_SHORTCUTS: usize = SPAN_SHORTCUTS;
-
-/// One value for each shortcut of a search.
-type Search = [f64; SEARCH_SHORTCUTS];
-
 /// Searches the least velocities of feasible shortcuts.
-pub(super) fn inner_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> Search {
-    let [mut v_min, place, lossy] = least_velocities(ends, a_2, a_3);
-    for i in (0..SEARCH_SHORTCUTS).filter(|&i| lossy[i] > 0.0) {
+pub(super) fn inner_velocities(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> PerShortcut {
+    let [mut v_min, place, lossy] = least(ends, a_2, a_3);
+    for i in (0..SPAN_SHORTCUTS).filter(|&i| lossy[i] > 0.0) {
         v_min[i] = Path::new(ends, a_2[i], a_3[i]).exact_velocity(place[i]);
     }
     v_min
 }
 
-/// [`least`] of many.
+/// Stationary points of `n/theta` by Newton's method, in single precision except for the last step. If the cubic `n - v t_f theta` does not
+/// prove that the velocity `v` there is the least, [`lower`] continues. Returns the least velocities, their positions, and 1 where rounding
+/// matters; infeasible lanes are meaningless.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn least_velocities(ends: &Ends, a_2: &Search, a_3: &Search) -> [Search; 3] {
-    least(ends, a_2, a_3)
-}
-
-/// Stationary points of `n/theta` by Newton's method, in single precision except for the last step. If the cubic `n - v t_f theta` does not
-/// prove that the velocity `v` there is the least, [`lower`] continues. Returns the least velocities, their positions, and 1 where rounding
-/// matters; infeasible lanes are meaningless.
-#[inline(always)]
-fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; N]; 3] {
-    let (mut v_min, mut place, mut due) = ([0.0; N], [0.0; N], [0.0; N]);
+fn least(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> [PerShortcut; 3] {
+    let [mut v_min, mut place, mut due] = [[0.0; SPAN_SHORTCUTS]; 3];
     let rough = rough_places(ends, a_2, a_3);
-    for i in 0..N {
+    for i in 0..SPAN_SHORTCUTS {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let (theta_end, n_end) = path.about_end();
-        let (theta_start, n_start) = (path.theta().c[0], path.n().c[0]);
+        let (theta_start, n_start) = (path.theta.c[0], path.n.c[0]);
         // Ratios are compared without a division.
         let first = n_start * theta_end[0] < n_end[0] * theta_start;
         let (n, theta) = (if first { n_start } else { n_end[0] }, if first { theta_start } else { theta_end[0] });
-        let x = nearer(path.theta().c, ends.t_f, f64::from(rough[i]));
-        let (n_there, theta_there) = (path.n().at(x), path.theta().at(x));
+        let x = nearer(path.theta.c, ends.t_f, f64::from(rough[i]));
+        let (n_there, theta_there) = (path.n.at(x), path.theta.at(x));
         let inside = (x > 0.0) & (x < 1.0) & (n_there * theta < n * theta_there) & (n_there > 0.0);
         let (n, theta) = (if inside { n_there } else { n }, if inside { theta_there } else { theta });
         let x = if inside {
@@ -369,15 +348,15 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
         (v_min[i], place[i]) = (v, x);
         due[i] = if settled { 0.0 } else { 1.0 };
     }
-    if due != [0.0; N] {
+    if due != [0.0; SPAN_SHORTCUTS] {
         lower(ends, a_2, a_3, &mut v_min, &mut place, due);
     }
-    let mut lossy = [0.0; N];
-    for i in 0..N {
+    let mut lossy = [0.0; SPAN_SHORTCUTS];
+    for i in 0..SPAN_SHORTCUTS {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let slack = path.slack();
-        let lost = is_lossy(path.n(), 3.0 * slack, place[i], ends.v_loss)
-            | is_lossy(path.theta(), slack, place[i], ends.v_loss);
+        let lost =
+            is_lossy(&path.n, 3.0 * slack, place[i], ends.v_loss) | is_lossy(&path.theta, slack, place[i], ends.v_loss);
         lossy[i] = if lost { 1.0 } else { 0.0 };
     }
     [v_min, place, lossy]
@@ -385,17 +364,17 @@ fn least<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [[f64; 
 
 /// Guesses of the minima: a few Newton steps from the least of some samples.
 #[inline(always)]
-fn rough_places<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> [f32; N] {
+fn rough_places(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> [f32; SPAN_SHORTCUTS] {
     let t_f = ends.t_f as f32;
-    let mut theta = [[0.0f32; N]; 4];
-    for i in 0..N {
+    let mut theta = [[0.0f32; SPAN_SHORTCUTS]; 4];
+    for i in 0..SPAN_SHORTCUTS {
         let path = Path::new(ends, a_2[i], a_3[i]);
-        for (theta, c) in theta.iter_mut().zip(path.theta().c) {
+        for (theta, c) in theta.iter_mut().zip(path.theta.c) {
             theta[i] = c as f32;
         }
     }
-    let mut place = [0.0f32; N];
-    for i in 0..N {
+    let mut place = [0.0f32; SPAN_SHORTCUTS];
+    for i in 0..SPAN_SHORTCUTS {
         let [c0, c1, c2, c3] = [theta[0][i], theta[1][i], theta[2][i], theta[3][i]];
         let (mut least, mut of) = (t_f - c1, c0);
         for x in [0.25, 0.5, 0.75, 1.0] {
@@ -407,7 +386,7 @@ fn rough_places<const N: usize>(ends: &Ends, a_2: &[f64; N], a_3: &[f64; N]) -> 
         }
     }
     for _ in 0..ROUGH_STEPS {
-        for i in 0..N {
+        for i in 0..SPAN_SHORTCUTS {
             place[i] = nearer([theta[0][i], theta[1][i], theta[2][i], theta[3][i]], t_f, place[i]);
         }
     }
@@ -440,34 +419,31 @@ const SLOPE_SQUARED: f64 = 1e-15;
 /// The least velocity by Dinkelbach's method (Management Science 13, 492, 1967): `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is
 /// not negative. The minimum of this cubic gives the next, lower `m`. The steps decrease to the least ratio, and each doubles the digits.
 #[inline(always)]
-fn lower<const N: usize>(
+fn lower(
     ends: &Ends,
-    a_2: &[f64; N],
-    a_3: &[f64; N],
-    v_min: &mut [f64; N],
-    place: &mut [f64; N],
-    mut due: [f64; N],
+    a_2: &PerShortcut,
+    a_3: &PerShortcut,
+    v_min: &mut PerShortcut,
+    place: &mut PerShortcut,
+    mut due: PerShortcut,
 ) {
     for _ in 0..MAX_STEPS {
-        for i in 0..N {
+        for i in 0..SPAN_SHORTCUTS {
             let path = Path::new(ends, a_2[i], a_3[i]);
             let x = path.surplus(v_min[i] * ends.t_f).minimum();
-            let v = path.n().at(x) / (ends.t_f * path.theta().at(x));
+            let v = path.n.at(x) / (ends.t_f * path.theta.at(x));
             let lower = (due[i] > 0.0) & (v < v_min[i]) & (v > 0.0);
-            let last = v >= (1.0 - LAST_STEP_RTOL) * v_min[i];
+            let last = v >= (1.0 - LAST_STEP_RESIDUAL) * v_min[i];
             v_min[i] = if lower { v } else { v_min[i] };
             // A velocity lost in rounding is computed again.
             place[i] = if lower | (v <= 0.0) { x } else { place[i] };
             due[i] = if lower & !last { 1.0 } else { 0.0 };
         }
-        if due == [0.0; N] {
+        if due == [0.0; SPAN_SHORTCUTS] {
             break;
         }
     }
 }
-
-/// Relative step after which the next one is within rounding. Derived: each step doubles the digits.
-const LAST_STEP_RTOL: f64 = 1e-9;
 
 /// Whether the relative rounding error of a cubic at `x` may exceed `loss`, or its value is NaN.
 #[inline(always)]

@@ -17,9 +17,8 @@
 
 use super::Landscape;
 use super::path::Path;
-use super::rules::{MappedPanel, PanelMap, Zeros, choose};
-use crate::numerics::elementary::{exp, ln, ln_1p};
-use crate::numerics::gauss::rule;
+use super::rules::{Zeros, choose};
+use crate::numerics::elementary::{ln, ln_near_1};
 use crate::protocol::SolverStats;
 
 /// Work and its derivatives with respect to the two coefficients of a basis.
@@ -81,8 +80,8 @@ impl Landscape {
                 // On the border v = 0, rounding may make n negative.
                 let n = (n0 + delta * (n1 + delta * n2)).max(f64::MIN_POSITIVE);
                 let tau = constant + a * ln(n) + slope * ln(theta);
-                let speed = ln_of(at(&above, delta) / (t_f * theta), n / (t_f * theta) * theta_i);
-                let age = ln_of(at(&aged, delta) / theta_i, theta / theta_i);
+                let speed = ln_near_1(at(&above, delta) / (t_f * theta), n / (t_f * theta) * theta_i);
+                let age = ln_near_1(at(&aged, delta) / theta_i, theta / theta_i);
                 let l = a * speed + b * age;
                 let (x, rest) = (panel.centre + delta, (1.0 - panel.centre) - delta);
                 let (d_theta, d_n) = basis.changes(x, rest);
@@ -110,35 +109,4 @@ impl Landscape {
 /// The value of a cubic at a distance from its expansion point.
 fn at([c0, c1, c2, c3]: &[f64; 4], delta: f64) -> f64 {
     c0 + delta * (c1 + delta * (c2 + delta * c3))
-}
-
-/// `ln(1 + change)`, where `1 + change` is `ratio`.
-fn ln_of(change: f64, ratio: f64) -> f64 {
-    if change.abs() < 0.5 { ln_1p(change) } else { ln(ratio) }
-}
-impl MappedPanel {
-    /// Visits the distance from the centre and the weight of every node.
-    pub(super) fn each_node(&self, mut visit: impl FnMut(f64, f64)) {
-        let rule = rule(self.nodes);
-        let (middle, half) = (0.5 * (self.from + self.to), 0.5 * (self.to - self.from));
-        for (x, w) in rule.x.iter().zip(&rule.w) {
-            let s = middle + half * x;
-            let (delta, jacobian) = match self.map {
-                PanelMap::Line => (s, 1.0),
-                PanelMap::Power { side, gap, squarings } => {
-                    let (mut power, mut jacobian) = (s, 1.0);
-                    for _ in 0..squarings {
-                        jacobian *= 2.0 * power;
-                        power *= power;
-                    }
-                    (side * (gap - power), jacobian)
-                }
-                PanelMap::Sinh { height } => {
-                    let q = exp(s);
-                    (0.5 * height * (q - 1.0 / q), 0.5 * height * (q + 1.0 / q))
-                }
-            };
-            visit(delta, half * w * jacobian);
-        }
-    }
 }

@@ -1,24 +1,24 @@
 //! The works of many shortcuts, each summed together with others of equal node count.
 
-use super::Landscape;
 use super::bins::{BINS, Bins, CUT_BIN, nodes_of};
 use super::cells::OWN_PLAN_BIN;
 use super::path::Path;
-use super::plan::{PLANNED_SHORTCUTS, PerShortcut, PlannedPanels, plan, plan_parts};
+use super::plan::{PlannedPanels, plan, plan_parts};
 use super::queue::{Cuts, Queue};
+use super::{Landscape, PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::lanes::LANES;
 use crate::protocol::SolverStats;
 
 /// Works in progress. A shortcut waits for the plan of its cell, possibly for its own plan or one with larger powers, and then for its sum.
 pub(super) struct Works<'a> {
-    due: Queue<PLANNED_SHORTCUTS>,
+    due: Queue,
     planned: Planned<'a>,
 }
 
 /// Shortcuts that need their own plan, and the last plans.
 struct Planned<'a> {
-    alone: Queue<PLANNED_SHORTCUTS>,
-    deep: Queue<PLANNED_SHORTCUTS>,
+    alone: Queue,
+    deep: Queue,
     from_cells: PlannedPanels,
     own: PlannedPanels,
     sums: Sums<'a>,
@@ -37,9 +37,9 @@ impl<'a> Works<'a> {
     /// An empty queue for shortcuts of a landscape, whose works are written to `work`.
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, stats: SolverStats::default() };
-        let (from_cells, own) = (PlannedPanels::EMPTY, PlannedPanels::EMPTY);
-        let planned = Planned { alone: Queue::EMPTY, deep: Queue::EMPTY, from_cells, own, sums };
-        Works { due: Queue::EMPTY, planned }
+        let (from_cells, own) = (PlannedPanels::default(), PlannedPanels::default());
+        let planned = Planned { alone: Queue::default(), deep: Queue::default(), from_cells, own, sums };
+        Works { due: Queue::default(), planned }
     }
 
     /// Adds the feasible shortcut at `index`, if its work is requested.
@@ -52,13 +52,13 @@ impl<'a> Works<'a> {
 
     /// Adds the feasible shortcuts from `first` on.
     pub fn push_span(&mut self, first: usize, a_2: &PerShortcut, a_3: &PerShortcut) {
-        if self.planned.sums.work.len() < first + PLANNED_SHORTCUTS {
-            for lane in 0..PLANNED_SHORTCUTS {
+        if self.planned.sums.work.len() < first + SPAN_SHORTCUTS {
+            for lane in 0..SPAN_SHORTCUTS {
                 self.push(first + lane, a_2[lane], a_3[lane]);
             }
             return;
         }
-        let indices: [usize; PLANNED_SHORTCUTS] = std::array::from_fn(|lane| first + lane);
+        let indices: [usize; SPAN_SHORTCUTS] = std::array::from_fn(|lane| first + lane);
         self.planned.plan(&indices, [a_2, a_3]);
     }
 
@@ -105,12 +105,7 @@ impl Planned<'_> {
 
 impl Sums<'_> {
     /// Plans shortcuts one by one.
-    fn plan(
-        &mut self,
-        alone: &mut Queue<PLANNED_SHORTCUTS>,
-        deep: &mut Queue<PLANNED_SHORTCUTS>,
-        made: &mut PlannedPanels,
-    ) {
+    fn plan(&mut self, alone: &mut Queue, deep: &mut Queue, made: &mut PlannedPanels) {
         let Some((indices, [a_2, a_3])) = alone.take() else { return };
         plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
         for (lane, &i) in indices.iter().enumerate() {
@@ -123,12 +118,12 @@ impl Sums<'_> {
     }
 
     /// Plans shortcuts with larger powers.
-    fn deepen(&mut self, deep: &mut Queue<PLANNED_SHORTCUTS>) {
+    fn deepen(&mut self, deep: &mut Queue) {
         let Some((indices, [a_2, a_3])) = deep.take() else { return };
-        let mut plan = PlannedPanels::EMPTY;
+        let mut plan = PlannedPanels::default();
         plan_parts(
             &self.of.ends,
-            [a_2, a_3, &[0.0; PLANNED_SHORTCUTS], &[1.0; PLANNED_SHORTCUTS]],
+            [a_2, a_3, &[0.0; SPAN_SHORTCUTS], &[1.0; SPAN_SHORTCUTS]],
             &self.of.accuracy,
             &mut plan,
         );
@@ -163,12 +158,12 @@ impl Sums<'_> {
     fn part(&mut self) {
         let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
-        let mut plan = PlannedPanels::EMPTY;
+        let mut plan = PlannedPanels::default();
         plan_parts(&of.ends, parts, &of.accuracy_of_parts, &mut plan);
         let [a_2, a_3, low, high] = parts;
         for (k, &i) in indices.iter().enumerate() {
             stats.quadratures += 1;
-            let lanes = [k, k + PLANNED_SHORTCUTS / 2];
+            let lanes = [k, k + SPAN_SHORTCUTS / 2];
             let path = Path::new(&of.ends, a_2[k], a_3[k]);
             // A shortcut may be fastest at the cut.
             let near = path.is_within(if low[k] == 0.0 { high[k] } else { low[k] }, of.accuracy.longest);

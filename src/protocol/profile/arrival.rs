@@ -19,8 +19,8 @@
 
 use multiversion::multiversion;
 
-use super::Exponent;
 use super::curve::{CurvePanel, MAX_PANELS, VelocityCurve, x_and_z_at_nodes};
+use super::{Exponent, panel_variation};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::numerics::root::{Probe, newton};
@@ -111,8 +111,8 @@ impl<E: Exponent> ArrivalProblem<E> {
     }
 
     /// Parameter `c` of the member that arrives, to `rtol`; the search begins at `start`. `None` where it fails.
-    pub fn solve(&self, start: f64, rtol: f64, panel_variation: f64, stats: &mut SolverStats) -> Option<f64> {
-        let required = self.required;
+    pub fn solve(&self, start: f64, rtol: f64, stats: &mut SolverStats) -> Option<f64> {
+        let (required, panel_variation) = (self.required, panel_variation(rtol));
         // The last Newton step doubles the digits.
         let enough = (0.1 * rtol).sqrt();
         let probe = |c: f64| {
@@ -166,13 +166,9 @@ impl<E: Exponent> ArrivalProblem<E> {
                 }
                 count += 1;
                 stats.nodes += NODES as u32;
-                let (left, counts) = if self.by_loss {
-                    add_by_loss(self, curve, &panel, rule, &mut sums);
-                    (self.free, sums.sum)
-                } else {
-                    add_by_miss(self, curve, &panel, rule, &mut sums);
-                    (self.max_integral, sums.slope * scale)
-                };
+                add(self, curve, &panel, rule, &mut sums);
+                let (left, counts) =
+                    if self.by_loss { (self.free, sums.sum) } else { (self.max_integral, sums.slope * scale) };
                 if exp(-sums.slip) * left <= NEGLIGIBLE_REST * rtol * counts {
                     return Some(sums);
                 }
@@ -187,7 +183,6 @@ impl<E: Exponent> ArrivalProblem<E> {
         Some(sums)
     }
 
-    /// Adds the integrals over one panel.
     #[inline(always)]
     fn add<const BY_LOSS: bool>(
         &self,
@@ -251,30 +246,21 @@ pub(super) fn total(values: &Nodes) -> f64 {
     sum[0]
 }
 
+/// Adds the integrals over one panel.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn add_by_loss<E: Exponent>(
+fn add<E: Exponent>(
     problem: &ArrivalProblem<E>,
     curve: &VelocityCurve<E>,
     panel: &CurvePanel,
     rule: &Radau,
     sums: &mut BackwardIntegrals,
 ) {
-    problem.add::<true>(curve, panel, rule, sums);
-}
-
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-fn add_by_miss<E: Exponent>(
-    problem: &ArrivalProblem<E>,
-    curve: &VelocityCurve<E>,
-    panel: &CurvePanel,
-    rule: &Radau,
-    sums: &mut BackwardIntegrals,
-) {
-    problem.add::<false>(curve, panel, rule, sums);
+    if problem.by_loss {
+        problem.add::<true>(curve, panel, rule, sums);
+    } else {
+        problem.add::<false>(curve, panel, rule, sums);
+    }
 }

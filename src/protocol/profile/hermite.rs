@@ -117,6 +117,8 @@ fn shifted(powers: &[f64; 6], d: f64) -> [f64; 6] {
 }
 
 impl Exponent for Hermite {
+    const INTERPOLATION: f64 = 0.45;
+
     fn with(self, c: f64) -> Hermite {
         Hermite { c, ..self }
     }

@@ -11,7 +11,7 @@ mod hermite;
 mod motion;
 mod theta;
 
-use crate::numerics::elementary::{exp, ln};
+use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::radau::NODES;
 
 pub(super) use arrival::ArrivalProblem;
@@ -22,6 +22,9 @@ pub(super) use theta::{InitialState, ResolvedPanel, WorkAndFriction, integrate_t
 
 /// Exponent `f = ln((v - floor)/(v_1 - floor))` of a velocity, 0 at the end, over `x = t/t_f`, with `z = 1 - x`.
 pub(super) trait Exponent: Copy + Sync {
+    /// Variation over a panel with theta at its nodes, fraction of that of a quadrature. Chosen: interpolation takes more nodes.
+    const INTERPOLATION: f64;
+
     /// Exponent with the parameter `c`; the larger `c`, the lower the velocity inside.
     fn with(self, c: f64) -> Self;
 
@@ -56,7 +59,13 @@ pub(super) trait Exponent: Copy + Sync {
 
 /// Variation of an exponent over a panel whose interpolation at the nodes has the relative accuracy `rtol`. An
 /// exponential of total variation `r` is interpolated to `2 (r/4)^n/n!`.
-pub(super) fn panel_variation(rtol: f64) -> f64 {
+fn panel_variation(rtol: f64) -> f64 {
     let factorial: f64 = (1..=NODES).map(|k| k as f64).product();
     (4.0 * exp(ln(0.01 * rtol * factorial) / NODES as f64)).clamp(2.0, 6.0)
+}
+
+/// `ln(w_1/w_0)` of two velocities above a floor that differ by `difference`.
+pub(super) fn ln_of_ratio(w_0: f64, w_1: f64, difference: f64) -> f64 {
+    let change = difference / w_0;
+    if change > -0.5 { ln_1p(change) } else { ln(w_1 / w_0) }
 }

@@ -5,7 +5,7 @@ use super::curve::VelocityCurve;
 use super::theta::{ResolvedPanel, friction_at};
 use crate::model::Law;
 use crate::numerics::elementary::exp;
-use crate::protocol::{Moment, Motion};
+use crate::protocol::{Moment, Motion, equal_landmarks, interval_at};
 
 /// Member as a motion: panels of equal length in the parameter `s`, each with theta at its nodes.
 pub struct ResolvedProfile<E> {
@@ -17,10 +17,8 @@ pub struct ResolvedProfile<E> {
 impl<E> ResolvedProfile<E> {
     /// Panel at `s`, and the fraction of it.
     pub fn panel_at(&self, s: f64) -> (&ResolvedPanel, f64) {
-        let count = self.panels.len();
-        let along = s.clamp(0.0, 1.0) * count as f64;
-        let k = (along as usize).min(count - 1);
-        (&self.panels[k], along - k as f64)
+        let (k, fraction) = interval_at(s, self.panels.len());
+        (&self.panels[k], fraction)
     }
 }
 
@@ -30,8 +28,7 @@ impl<E: Exponent> Motion for ResolvedProfile<E> {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let count = self.panels.len();
-        (0..=count).map(|k| k as f64 / count as f64).collect()
+        equal_landmarks(self.panels.len())
     }
 
     fn at(&self, s: f64) -> Moment {

@@ -7,9 +7,9 @@
 use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
-use super::Exponent;
 use super::arrival::total;
 use super::curve::{CurvePanel, MAX_PANELS, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
+use super::{Exponent, panel_variation};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
@@ -60,17 +60,16 @@ impl InitialState {
     }
 }
 
-/// Integrates theta along the curve, hands every panel to `visit`, and returns theta at the end; `None` where numbers
-/// leave the range of a double.
+/// Integrates theta along the curve, and hands every panel to `visit`; `None` where numbers leave the range of a double, and where theta does not
+/// arrive at `theta_1`: a test of the root by an independent route.
 pub fn integrate_theta<E: Exponent>(
     curve: &VelocityCurve<E>,
-    start: InitialState,
+    (start, theta_1): (InitialState, f64),
     rtol: f64,
-    panel_variation: f64,
     stats: &mut SolverStats,
     mut visit: impl FnMut(&ResolvedPanel),
-) -> Option<f64> {
-    let rule = radau();
+) -> Option<()> {
+    let (rule, panel_variation) = (radau(), E::INTERPOLATION * panel_variation(rtol));
     let InitialState { mut v, mut theta, mut rate, slow } = start;
     // Slip since theta last left the slow solution (at the start, or where v changes too fast), and its relative distance.
     let (mut slip, mut off) = (0.0, if slow { lag(curve, ProtocolEnd::Start, 0.0, v) } else { 1.0 });
@@ -106,8 +105,11 @@ pub fn integrate_theta<E: Exponent>(
             d = panel.to;
         }
     }
-    Some(theta)
+    ((theta / theta_1 - 1.0).abs() <= 10.0 * rtol + ROUNDING).then_some(())
 }
+
+/// Relative rounding error of theta at the end, at most. Chosen: as much as the error allowed at the tightest `rtol`, 1e-13.
+const ROUNDING: f64 = 1e-12;
 
 /// Relative change of `v` in the relaxation time of theta: the relative distance of theta from `1/v` on the slow solution.
 fn lag<E: Exponent>(curve: &VelocityCurve<E>, side: ProtocolEnd, d: f64, v: f64) -> f64 {

@@ -53,7 +53,7 @@ pub fn solve(
     bounded: bool,
     rtol: f64,
 ) -> Solved<Regularised> {
-    assemble(slider, (v_i, v_f), (t_f, delta_t), bounded, rtol, |_| ()).0
+    assemble(slider, (v_i, v_f), (t_f, delta_t), bounded, rtol).0
 }
 
 /// Regularises the optimum as [`solve`] does, and returns its motion as well wherever it has numbers.
@@ -65,11 +65,8 @@ pub fn motion(
     bounded: bool,
     rtol: f64,
 ) -> (Solved<Regularised>, Option<Box<dyn Motion>>) {
-    let mut segments = Vec::new();
-    let (solved, route) = assemble(slider, (v_i, v_f), (t_f, delta_t), bounded, rtol, |segment| segments.push(segment));
-    let smooth = route
-        .filter(|_| solved.value.is_some())
-        .and_then(|route| RegularisedMotion::new(*slider, route, segments, rtol));
+    let (solved, parts) = assemble(slider, (v_i, v_f), (t_f, delta_t), bounded, rtol);
+    let smooth = parts.and_then(|(route, segments)| RegularisedMotion::new(*slider, route, segments, rtol));
     (solved, smooth.map(|smooth| Box::new(smooth) as Box<dyn Motion>))
 }
 
@@ -81,15 +78,14 @@ enum RegularisedSegment {
     Replaced(SmoothPiece),
 }
 
-/// Solves, and hands the segments to `visit` in the order of time.
+/// The numbers, and the optimum with the segments in the order of time.
 fn assemble(
     slider: &SpringBlock,
     (v_i, v_f): (f64, f64),
     (t_f, delta_t): (f64, f64),
     bounded: bool,
     rtol: f64,
-    visit: impl FnMut(RegularisedSegment),
-) -> (Solved<Regularised>, Option<Route>) {
+) -> (Solved<Regularised>, Option<(Route, Vec<RegularisedSegment>)>) {
     let none = |status, stats| (Solved { status, value: None, stats }, None);
     let sound = delta_t > 0.0 && 2.0 * delta_t <= t_f && slider.k > 0.0 && slider.m >= 0.0 && slider.m.is_finite();
     if !sound {
@@ -101,7 +97,7 @@ fn assemble(
     let mut sum = Assembly {
         slider: *slider,
         rtol,
-        visit,
+        segments: Vec::new(),
         excess: 0.0,
         replaced: 0.0,
         friction_min: f64::INFINITY,
@@ -133,7 +129,7 @@ fn assemble(
     }
     let own = if value.v_min < 1.0 { Status::BelowBound } else { Status::Ok };
     let status = own.with_friction(sum.friction_min).compared_with(solved.status);
-    (Solved { status, value: Some(value), stats }, Some(route))
+    (Solved { status, value: Some(value), stats }, Some((route, sum.segments)))
 }
 
 /// Whether the optimum need not be unique.
@@ -145,11 +141,10 @@ fn is_doubtful(status: Status) -> bool {
 const MIN_VELOCITY: f64 = 1e-100;
 
 /// Sums and extremes along the protocol.
-struct Assembly<F> {
+struct Assembly {
     slider: SpringBlock,
     rtol: f64,
-    /// Takes the segments.
-    visit: F,
+    segments: Vec<RegularisedSegment>,
     /// Work beyond that of the optimum.
     excess: f64,
     /// Work of the pieces.
@@ -160,7 +155,7 @@ struct Assembly<F> {
     control: ValueRange,
 }
 
-impl<F: FnMut(RegularisedSegment)> Assembly<F> {
+impl Assembly {
     /// Adds the pieces and the optimum between them in the order of time; `Err` with the status of a piece without
     /// numbers.
     fn gather(
@@ -201,7 +196,7 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
         if friction <= slider.law.b - slider.law.a {
             route.range(from, to, Tolerance::OfValue(rtol), &mut self.v, |jet| [jet.v[0], jet.v[1] / jet.v[0]]);
         }
-        (self.visit)(RegularisedSegment::Kept(from, to));
+        self.segments.push(RegularisedSegment::Kept(from, to));
     }
 
     /// Replaces the optimum between two points by a smooth piece.
@@ -224,7 +219,7 @@ impl<F: FnMut(RegularisedSegment)> Assembly<F> {
         self.v.add(piece.v.high);
         self.control.add(piece.control.low);
         self.control.add(piece.control.high);
-        (self.visit)(RegularisedSegment::Replaced(piece));
+        self.segments.push(RegularisedSegment::Replaced(piece));
         Ok(())
     }
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::RegularisedSegment;
 use crate::protocol::optimal::{PathPoint, Route};
 use crate::protocol::profile::{Hermite, ResolvedProfile};
-use crate::protocol::{Jet, Moment, Motion, SpringBlock};
+use crate::protocol::{Jet, Moment, Motion, SpringBlock, equal_landmarks, interval_at};
 
 /// Regularised optimum as a motion: intervals of equal length in the parameter.
 pub(super) struct RegularisedMotion {
     slider: SpringBlock,
     route: Route,
-    panel_ranges: Vec<MotionInterval>,
+    intervals: Vec<MotionInterval>,
 }
 
 /// Interval on which the motion is smooth.
@@ -30,19 +30,19 @@ impl RegularisedMotion {
         segments: Vec<RegularisedSegment>,
         rtol: f64,
     ) -> Option<RegularisedMotion> {
-        let mut panel_ranges = Vec::new();
+        let mut intervals = Vec::new();
         let mut time = 0.0;
         for segment in segments {
             match segment {
                 RegularisedSegment::Kept(from, to) => {
                     let sites = route.landmarks(from, to);
-                    panel_ranges.extend(sites.windows(2).map(|pair| MotionInterval::Kept(pair[0], pair[1])));
+                    intervals.extend(sites.windows(2).map(|pair| MotionInterval::Kept(pair[0], pair[1])));
                     time = route.time(to);
                 }
                 RegularisedSegment::Replaced(piece) => {
                     let piece = Arc::new(piece.resolve(slider.law, rtol)?);
                     let marks = piece.landmarks();
-                    panel_ranges.extend(marks.windows(2).map(|pair| MotionInterval::Replaced {
+                    intervals.extend(marks.windows(2).map(|pair| MotionInterval::Replaced {
                         piece: piece.clone(),
                         begin: time,
                         from: pair[0],
@@ -52,7 +52,7 @@ impl RegularisedMotion {
                 }
             }
         }
-        Some(RegularisedMotion { slider, route, panel_ranges })
+        Some(RegularisedMotion { slider, route, intervals })
     }
 
     fn moment(&self, t: f64, jet: &Jet) -> Moment {
@@ -73,26 +73,23 @@ impl Motion for RegularisedMotion {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let count = self.panel_ranges.len();
-        (0..=count).map(|k| k as f64 / count as f64).collect()
+        equal_landmarks(self.intervals.len())
     }
 
     fn at(&self, s: f64) -> Moment {
-        let count = self.panel_ranges.len();
-        let along = s.clamp(0.0, 1.0) * count as f64;
-        let k = (along as usize).min(count - 1);
-        let (u, mix) = (along - k as f64, |from: f64, to: f64, u: f64| from * (1.0 - u) + to * u);
-        match &self.panel_ranges[k] {
+        let (k, u) = interval_at(s, self.intervals.len());
+        let mix = |from: f64, to: f64| from * (1.0 - u) + to * u;
+        match &self.intervals[k] {
             MotionInterval::Kept(from, to) => {
                 let site = match (*from, *to) {
-                    (PathPoint::Held(from), PathPoint::Held(to)) => PathPoint::Held(mix(from, to, u)),
-                    (PathPoint::Moving(from), PathPoint::Moving(to)) => PathPoint::Moving(mix(from, to, u)),
+                    (PathPoint::Held(from), PathPoint::Held(to)) => PathPoint::Held(mix(from, to)),
+                    (PathPoint::Moving(from), PathPoint::Moving(to)) => PathPoint::Moving(mix(from, to)),
                     (_, to) => to,
                 };
                 self.moment(self.route.time(site), &self.route.jet(site))
             }
             MotionInterval::Replaced { piece, begin, from, to } => {
-                let s = mix(*from, *to, u);
+                let s = mix(*from, *to);
                 let (panel, u) = piece.panel_at(s);
                 self.moment(begin + piece.at(s).t, &panel.jet(&piece.curve, u))
             }

@@ -11,12 +11,12 @@
 //! takes about a quarter of the mean for every `rho`. An end where theta has the time to follow `1/v` is not stretched.
 
 use crate::model::Law;
-use crate::numerics::elementary::{ln, ln_1p};
+use crate::numerics::elementary::ln;
 use crate::protocol::control::{Tolerance, ValueRange};
 use crate::protocol::optimal::{PathSegment, lag_at_bound};
 use crate::protocol::profile::{
     ArrivalProblem, Hermite, InitialState, ResolvedProfile, VelocityCurve, WorkAndFriction, integrate_theta,
-    panel_variation,
+    ln_of_ratio,
 };
 use crate::protocol::{Jet, SolverStats, SpringBlock, Status};
 
@@ -43,15 +43,9 @@ pub(super) struct SmoothPiece {
     /// Range of the control velocity.
     pub control: ValueRange,
     curve: VelocityCurve<Hermite>,
-    from: InitialState,
+    /// State at its start, and theta at its end.
+    ends: (InitialState, f64),
 }
-
-/// Variation of the exponent over a panel, fraction of that of a quadrature. Chosen: interpolation of theta and its rate
-/// takes more nodes.
-const INTERPOLATION: f64 = 0.45;
-
-/// Relative rounding error of theta at the end, at most. Chosen: as much as the error allowed at the tightest `rtol`, 1e-13.
-const ROUNDING: f64 = 1e-12;
 
 impl PieceEnd {
     /// State of the optimum.
@@ -106,8 +100,7 @@ impl SmoothPiece {
             return Err(Status::Infeasible);
         }
         let (w_0, w_1) = (start.v[0] - floor, end.v[0] - floor);
-        let ratio = (w_1 - w_0) / w_0;
-        let rise = if ratio > -0.5 { ln_1p(ratio) } else { ln(w_1 / w_0) };
+        let rise = ln_of_ratio(w_0, w_1, w_1 - w_0);
         // About the mean of v that brings theta to its target.
         let mean = lag / (time * (start.theta * end.theta).sqrt()) - floor;
         let rho = [start, end].map(|at| if at.outer { (at.v[0] - floor) / mean } else { 1.0 });
@@ -127,30 +120,28 @@ impl SmoothPiece {
         if spare.is_nan() || spare <= 0.0 {
             return Err(Status::NotConverged);
         }
-        let ends = [start.theta, end.theta];
-        let problem = ArrivalProblem::between(ends, -growth / end.theta, end.rate / end.theta, spare, curve);
-        let curve = curve.with(problem.solve(0.0, rtol, panel_variation(rtol), stats).ok_or(Status::NotConverged)?);
+        let (fall, pull) = (-growth / end.theta, end.rate / end.theta);
+        let problem = ArrivalProblem::between([start.theta, end.theta], fall, pull, spare, curve);
+        let curve = curve.with(problem.solve(0.0, rtol, stats).ok_or(Status::NotConverged)?);
         let from = InitialState { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
+        let ends = (from, end.theta);
         let mut piece =
-            SmoothPiece { totals: WorkAndFriction::NONE, v: ValueRange::NONE, control: ValueRange::NONE, curve, from };
-        let theta = integrate_theta(&curve, from, rtol, INTERPOLATION * panel_variation(rtol), stats, |panel| {
+            SmoothPiece { totals: WorkAndFriction::NONE, v: ValueRange::NONE, control: ValueRange::NONE, curve, ends };
+        let followed = integrate_theta(&curve, ends, rtol, stats, |panel| {
             panel.add_to(&slider.law, &curve, rtol, &mut piece.totals);
             panel.range(&curve, Tolerance::OfValue(rtol), &mut piece.v, |jet, _| [jet.v[0], jet.v[1] / jet.v[0]]);
             panel.range(&curve, Tolerance::OfRange(rtol), &mut piece.control, |jet, bend| {
                 [slider.control(jet), slider.control_rate(jet, bend)]
             });
         });
-        let arrives = theta.is_some_and(|theta| (theta / end.theta - 1.0).abs() <= 10.0 * rtol + ROUNDING);
-        if arrives { Ok(piece) } else { Err(Status::NotConverged) }
+        followed.map(|()| piece).ok_or(Status::NotConverged)
     }
 
     /// The piece over time; `None` where numbers leave the range of a double.
     pub fn resolve(&self, law: Law, rtol: f64) -> Option<ResolvedProfile<Hermite>> {
         let mut panels = Vec::new();
-        let panel_variation = INTERPOLATION * panel_variation(rtol);
-        integrate_theta(&self.curve, self.from, rtol, panel_variation, &mut SolverStats::default(), |panel| {
-            panels.push(*panel)
-        })?;
+        let mut stats = SolverStats::default();
+        integrate_theta(&self.curve, self.ends, rtol, &mut stats, |panel| panels.push(*panel))?;
         Some(ResolvedProfile { law, curve: self.curve, panels })
     }
 }

@@ -6,61 +6,47 @@
 //! both halves have their own, in the distance from their end.
 
 use super::{Case, Family, Obstacle, Shortcut};
-use crate::model::Law;
+use crate::model::{Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::polynomial::roots_between;
+use crate::protocol::control::ValueRange;
 use crate::protocol::cubic::{Landscape, LandscapeBuffers, rise};
-use crate::protocol::{Moment, Motion, SolverStats, Status};
+use crate::protocol::profile::ProtocolEnd;
+use crate::protocol::{Moment, Motion, SolverStats, Status, equal_landmarks, interval_at};
 
 /// The family `cubic`.
-pub struct Cubic;
+pub(super) const FAMILY: Family = Family {
+    name: "cubic",
+    doc: "theta a cubic in time, v continuous at both ends",
+    alpha: None,
+    uses_tau_ceiling: false,
+    arrives: true,
+    solve,
+    motion,
+};
 
-impl Family for Cubic {
-    fn name(&self) -> &'static str {
-        "cubic"
-    }
-
-    fn doc(&self) -> &'static str {
-        "theta a cubic in time, v continuous at both ends"
-    }
-
-    fn alpha(&self) -> Option<&'static str> {
-        None
-    }
-
-    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
-        let curve = Curve::new(case)?;
-        let work = curve.work(case, rtol, stats)?;
-        let (mut v_min, mut v_max) = (f64::INFINITY, 0.0f64);
-        for (side, d) in curve.extrema(1.0, -1.0) {
-            let v = curve.velocity(side, d);
-            (v_min, v_max) = (v_min.min(v), v_max.max(v));
-        }
-        let extrema = curve.extrema(case.transition.law.a, case.transition.law.b - case.transition.law.a);
-        let frictions: Vec<f64> = extrema.into_iter().map(|(side, d)| curve.friction(side, d)).collect();
-        Ok(Shortcut {
-            alpha: None,
-            work,
-            v_min,
-            v_max,
-            friction_max: frictions.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            friction_min: frictions.iter().copied().fold(f64::INFINITY, f64::min),
-            miss: 0.0,
-        })
-    }
-
-    fn motion(&self, case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
-        let curve = Curve::new(case)?;
-        Ok(Box::new(CubicMotion { curve, breakpoints: curve.breakpoints() }))
-    }
+fn solve(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
+    let curve = Curve::new(case)?;
+    let work = curve.work(case, rtol, stats)?;
+    let Law { a, b } = case.transition.law;
+    let (mut v, mut friction) = (ValueRange::NONE, ValueRange::NONE);
+    curve.extrema(1.0, -1.0).into_iter().for_each(|(side, d)| v.add(curve.velocity(side, d)));
+    curve.extrema(a, b - a).into_iter().for_each(|(side, d)| friction.add(curve.friction(side, d)));
+    Ok(Shortcut {
+        alpha: None,
+        work,
+        v_min: v.low,
+        v_max: v.high,
+        friction_max: friction.high,
+        friction_min: friction.low,
+        miss: 0.0,
+    })
 }
 
-/// End of the protocol from which a distance is measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum ProtocolEnd {
-    Start,
-    End,
+fn motion(case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
+    let curve = Curve::new(case)?;
+    Ok(Box::new(CubicMotion { curve, breakpoints: curve.breakpoints() }))
 }
 
 /// The only member of the family.
@@ -80,11 +66,7 @@ struct Curve {
 
 impl Curve {
     fn new(case: &Case) -> Result<Curve, Obstacle> {
-        let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
-        let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
-        if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
-            return Err(Obstacle::Domain);
-        }
+        let (Transition { law, v_i, v_f }, t_f) = (case.transition, case.t_f);
         let rise = rise(v_i, v_f);
         let waist = (DoubleDouble::new(t_f) - DoubleDouble::new(1.5) * rise).high;
         if waist <= 0.0 {
@@ -99,13 +81,8 @@ impl Curve {
             return Ok(self.friction(ProtocolEnd::Start, 0.0) * self.v_i * self.t_f);
         }
         let (mut work, mut status) = ([0.0], [Status::Infeasible]);
-        let spent = Landscape::new(&case.transition, self.t_f, rtol).evaluate(
-            &[0.0],
-            &[3.0 * self.rise],
-            LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status },
-        );
-        stats.quadratures += spent.quadratures;
-        stats.nodes += spent.nodes;
+        let out = LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status };
+        *stats += Landscape::new(&case.transition, self.t_f, rtol).evaluate(&[0.0], &[3.0 * self.rise], out);
         if status[0] == Status::Infeasible { Err(Obstacle::Velocity) } else { Ok(work[0]) }
     }
 
@@ -182,17 +159,13 @@ impl Motion for CubicMotion {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let pieces = self.breakpoints.len() - 1;
-        (0..=pieces).map(|k| k as f64 / pieces as f64).collect()
+        equal_landmarks(self.breakpoints.len() - 1)
     }
 
     fn at(&self, s: f64) -> Moment {
-        let pieces = self.breakpoints.len() - 1;
-        let along = s.clamp(0.0, 1.0) * pieces as f64;
-        let k = (along as usize).min(pieces - 1);
-        let ((_, from), (side, to)) = (self.breakpoints[k], self.breakpoints[k + 1]);
+        let (k, fraction) = interval_at(s, self.breakpoints.len() - 1);
         // The middle is a breakpoint at equal distance from both ends.
-        let fraction = along - k as f64;
+        let ((_, from), (side, to)) = (self.breakpoints[k], self.breakpoints[k + 1]);
         let d = from * (1.0 - fraction) + to * fraction;
         let x = if side == ProtocolEnd::Start { d } else { 1.0 - d };
         Moment {

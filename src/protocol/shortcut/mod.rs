@@ -10,7 +10,7 @@ mod step;
 use std::fmt;
 
 use super::{Motion, SolverStats, Status};
-use crate::model::Transition;
+use crate::model::{Law, Transition};
 
 /// Transition, duration and bound that a member of a family solves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +21,16 @@ pub struct Case {
     pub t_f: f64,
     /// Bound on friction `tau_M`, in `mu_0 sigma`; only `bounded_friction` uses it.
     pub tau_ceiling: f64,
+}
+
+impl Case {
+    /// The obstacle where an argument is outside its domain.
+    fn check(&self) -> Result<(), Obstacle> {
+        let Transition { law: Law { a, b }, v_i, v_f } = self.transition;
+        let is_inside = a > 0.0 && b >= 0.0 && self.t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
+        let is_finite = [a, b, self.t_f, v_i, v_f].iter().all(|x| x.is_finite());
+        if is_inside && is_finite { Ok(()) } else { Err(Obstacle::Domain) }
+    }
 }
 
 /// Member of a family that solves a [`Case`]. Every number has the requested relative accuracy.
@@ -119,46 +129,50 @@ impl fmt::Display for Obstacle {
 }
 
 /// A family of shortcuts.
-pub trait Family: Sync {
+pub struct Family {
     /// Name in specs and tables.
-    fn name(&self) -> &'static str;
-
+    pub name: &'static str,
     /// Description in one line.
-    fn doc(&self) -> &'static str;
-
+    pub doc: &'static str,
     /// Definition of the parameter in one line; `None` for a family without parameter.
-    fn alpha(&self) -> Option<&'static str>;
-
+    pub alpha: Option<&'static str>,
     /// Whether `tau_ceiling` bounds the friction of the family.
-    fn uses_tau_ceiling(&self) -> bool {
-        false
-    }
-
+    pub uses_tau_ceiling: bool,
     /// Whether its members arrive at the final state.
-    fn arrives(&self) -> bool {
-        true
-    }
+    pub arrives: bool,
+    /// [`Family::solve`] for a case inside the domain.
+    solve: fn(&Case, f64, &mut SolverStats) -> Result<Shortcut, Obstacle>,
+    /// [`Family::motion`] for a case inside the domain.
+    motion: fn(&Case, f64) -> Result<Box<dyn Motion>, Obstacle>,
+}
 
+impl Family {
     /// Member that solves `case`, every number to the relative tolerance `rtol`; adds to `stats`.
     ///
     /// # Errors
     ///
     /// The [`Obstacle`] where the family has no certified member.
-    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle>;
+    pub fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
+        case.check()?;
+        (self.solve)(case, rtol, stats)
+    }
 
     /// Motion of that member.
     ///
     /// # Errors
     ///
     /// The [`Obstacle`] where the family has no certified member.
-    fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle>;
+    pub fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
+        case.check()?;
+        (self.motion)(case, rtol)
+    }
 }
 
 /// All families, in the order in which they are listed.
-pub const FAMILIES: [&dyn Family; 4] =
-    [&step::Step, &cubic::Cubic, &bounded_velocity::BoundedVelocity, &bounded_friction::BoundedFriction];
+pub const FAMILIES: [&Family; 4] =
+    [&step::FAMILY, &cubic::FAMILY, &bounded_velocity::FAMILY, &bounded_friction::FAMILY];
 
 /// The family of this name.
-pub fn find(name: &str) -> Option<&'static dyn Family> {
-    FAMILIES.into_iter().find(|family| family.name() == name)
+pub fn find(name: &str) -> Option<&'static Family> {
+    FAMILIES.into_iter().find(|family| family.name == name)
 }

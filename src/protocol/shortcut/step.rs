@@ -4,53 +4,39 @@
 //! closed form. The work contains `int ln(1 + k e^-p) dp`, a difference of two dilogarithms.
 
 use super::{Case, Family, Obstacle, Shortcut};
-use crate::model::Law;
+use crate::model::{Law, Transition};
 use crate::numerics::dilogarithm::dilogarithm;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::protocol::{Moment, Motion, SolverStats};
 
 /// The family `step`.
-pub struct Step;
+pub(super) const FAMILY: Family = Family {
+    name: "step",
+    doc: "the velocity jumps to v_f at once and stays there; theta only approaches its target",
+    alpha: None,
+    uses_tau_ceiling: false,
+    arrives: false,
+    solve,
+    motion: |case, _| Ok(Box::new(Relaxation::new(case))),
+};
 
-impl Family for Step {
-    fn name(&self) -> &'static str {
-        "step"
-    }
-
-    fn doc(&self) -> &'static str {
-        "the velocity jumps to v_f at once and stays there; theta only approaches its target"
-    }
-
-    fn alpha(&self) -> Option<&'static str> {
-        None
-    }
-
-    fn arrives(&self) -> bool {
-        false
-    }
-
-    fn solve(&self, case: &Case, _rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
-        let Relaxation { law, v_f, t_f, decay } = Relaxation::new(case)?;
-        stats.quadratures += 1;
-        let end = v_f * t_f;
-        let steady = 1.0 + (law.a - law.b) * ln(v_f);
-        // Theta is monotone.
-        let ratios = [decay.ln_at(0.0), decay.ln_at(end)];
-        Ok(Shortcut {
-            alpha: None,
-            work: end * steady + law.b * decay.integral(end),
-            v_min: v_f,
-            v_max: v_f,
-            friction_max: steady + law.b * ratios[0].max(ratios[1]),
-            friction_min: steady + law.b * ratios[0].min(ratios[1]),
-            miss: decay.k * exp(-end),
-        })
-    }
-
-    fn motion(&self, case: &Case, _rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
-        Ok(Box::new(Relaxation::new(case)?))
-    }
+fn solve(case: &Case, _rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
+    let Relaxation { law, v_f, t_f, decay } = Relaxation::new(case);
+    stats.quadratures += 1;
+    let end = v_f * t_f;
+    let steady = 1.0 + (law.a - law.b) * ln(v_f);
+    // Theta is monotone.
+    let ratios = [decay.ln_at(0.0), decay.ln_at(end)];
+    Ok(Shortcut {
+        alpha: None,
+        work: end * steady + law.b * decay.integral(end),
+        v_min: v_f,
+        v_max: v_f,
+        friction_max: steady + law.b * ratios[0].max(ratios[1]),
+        friction_min: steady + law.b * ratios[0].min(ratios[1]),
+        miss: decay.k * exp(-end),
+    })
 }
 
 /// The member as a motion: theta relaxes at constant velocity.
@@ -63,13 +49,9 @@ struct Relaxation {
 }
 
 impl Relaxation {
-    fn new(case: &Case) -> Result<Relaxation, Obstacle> {
-        let (law, v_i, v_f, t_f) = (case.transition.law, case.transition.v_i, case.transition.v_f, case.t_f);
-        let sound = law.a > 0.0 && law.b >= 0.0 && t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
-        if !sound || ![law.a, law.b, t_f, v_i, v_f].iter().all(|x| x.is_finite()) {
-            return Err(Obstacle::Domain);
-        }
-        Ok(Relaxation { law, v_f, t_f, decay: Decay { k: (v_f - v_i) / v_i, ratio: v_f / v_i } })
+    fn new(case: &Case) -> Relaxation {
+        let Transition { law, v_i, v_f } = case.transition;
+        Relaxation { law, v_f, t_f: case.t_f, decay: Decay { k: (v_f - v_i) / v_i, ratio: v_f / v_i } }
     }
 
     /// Finest scale in `p`: theta grows within the ratio of the velocities.

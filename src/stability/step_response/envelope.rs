@@ -14,6 +14,7 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
+use super::integration::STAGES as S;
 use super::long_term::{Follower, excess};
 use super::orbit::{Orbit, StopReason};
 use super::scaled_block::SectionPoint;
@@ -54,8 +55,7 @@ pub(super) enum EnvelopeResult {
     NotSlow,
 }
 
-/// Stages of an envelope step, and unknowns of its system.
-const S: usize = 5;
+/// Unknowns of an envelope step.
 const SYSTEM: usize = 2 * S;
 
 /// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion by rounding of the force in the physical
@@ -175,7 +175,7 @@ impl Follower<'_> {
         // From a point that the response need not reach.
         let cycle =
             cycle.map_err(|stop| if stop == StopReason::Divergence { StopReason::BelowStepError } else { stop })?;
-        let range = cycle.extrema.map(|seen| seen.map_or(0.0, |seen| orbit.refined(seen).x));
+        let range = cycle.exact_range(&mut orbit);
         let end = self.slider.section_point(&cycle.end);
         let change = [end[0] - from[0], end[1] - from[1]];
         if change[0].is_nan() {

@@ -5,12 +5,12 @@
 use super::envelope::{DIFFERENCE_STEP, EnvelopeResult, FixedPoint, MIN_STEP_ERROR, MapStep, distance, size};
 use super::orbit::{BAND, Cycle, Extremum, Orbit, RoughExtremum, StopReason};
 use super::scaled_block::{ScaledBlock, SectionPoint, State, X};
-use super::simulation::{LongTermBehaviour, MIN_DIFFERENCE, Simulation, UNDERFLOW_LN_V, UnresolvedNumbers};
+use super::simulation::{ACCURACIES, LongTermBehaviour, MIN_DIFFERENCE, Simulation, UNDERFLOW_LN_V, UnresolvedNumbers};
 use crate::numerics::elementary::{exp, ln};
 
 /// Small motions about steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearStability {
+pub(super) struct LinearStability {
     /// Whether they decay.
     pub stable: bool,
     /// Growth of `ln z` over a cycle; `None` if they do not oscillate.
@@ -20,7 +20,8 @@ pub struct LinearStability {
 /// Steps of one run, at most. Chosen: some ten times those of a response that envelope following decides.
 pub(super) const MAX_STEPS: u32 = 100_000;
 
-/// Error of a step, fraction of the error of a run. Chosen: the errors of the thirty-odd steps of a slip add up.
+/// Error of a step, fraction of the error of a run, and distance from the limit cycle, fraction of `rtol`. Chosen: the errors of the thirty-odd steps of
+/// a slip add up.
 const STEP_ERROR: f64 = 0.03;
 
 /// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
@@ -50,11 +51,8 @@ const MIN_CYCLES: u32 = 10;
 /// Ratio of the last to the first of a sequence of falling changes, at most. Chosen: errors of steps differ by less.
 const MAX_FALL_RATIO: f64 = 0.01;
 
-/// Distance from the limit cycle, in units of `rtol`. Chosen: the error of a step, [`STEP_ERROR`].
-const LIMIT_ERROR: f64 = 0.03;
-
 /// Difference of `ln v` within which two peaks are equal, in units of `rtol`: the accuracy of the second run.
-const PEAK_TIE: f64 = 0.3;
+const PEAK_TIE: f64 = ACCURACIES[1];
 
 /// Runs the response from `e^x v_f` once; the errors of its steps add up to `error_fraction` of `rtol`.
 pub(super) fn follow_once(
@@ -70,7 +68,7 @@ pub(super) fn follow_once(
         requested_rtol: rtol.max(MIN_DIFFERENCE),
         rtol: error_fraction * rtol,
         tolerance: step_error(rtol, error_fraction),
-        min_step_error: MIN_STEP_ERROR * (error_fraction / 0.3).max(1.0),
+        min_step_error: min_step_error(error_fraction),
         budget: MAX_STEPS,
         extrema: [None; 2],
         is_peak_ambiguous: false,
@@ -90,7 +88,12 @@ pub(super) fn follow_once(
 
 /// Error of a step in a run to `error_fraction` of `rtol`; the first two runs always differ in it.
 pub(super) fn step_error(rtol: f64, error_fraction: f64) -> f64 {
-    (STEP_ERROR * error_fraction * rtol).max(MIN_STEP_ERROR * (error_fraction / 0.3).max(1.0))
+    (STEP_ERROR * error_fraction * rtol).max(min_step_error(error_fraction))
+}
+
+/// Least error of a step in such a run.
+fn min_step_error(error_fraction: f64) -> f64 {
+    MIN_STEP_ERROR * (error_fraction / ACCURACIES[1]).max(1.0)
 }
 
 pub(super) struct Follower<'a> {
@@ -367,10 +370,10 @@ impl CycleConvergence {
         let remaining = largest / (1.0 - largest);
         // False for NaN.
         let comes_from_far = self.change < MAX_FALL_RATIO * self.first_change;
-        let converges = comes_from_far && largest < MAX_RATIO && self.change * remaining < LIMIT_ERROR * rtol;
-        self.small_changes += u32::from(comes_from_far && self.change < LIMIT_ERROR * rtol);
+        let converges = comes_from_far && largest < MAX_RATIO && self.change * remaining < STEP_ERROR * rtol;
+        self.small_changes += u32::from(comes_from_far && self.change < STEP_ERROR * rtol);
         let low_change = self.low_change * remaining.max(0.01);
-        (converges && (low_change < LIMIT_ERROR * rtol || self.low < UNDERFLOW_LN_V)) || self.small_changes > MIN_CYCLES
+        (converges && (low_change < STEP_ERROR * rtol || self.low < UNDERFLOW_LN_V)) || self.small_changes > MIN_CYCLES
     }
 
     /// Whether cycles change slowly, at a nearly constant rate.
@@ -386,7 +389,7 @@ impl Cycle {
     }
 
     /// Least and greatest `ln(v/v_f)`, to the order of the method.
-    fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
+    pub(super) fn exact_range(&self, orbit: &mut Orbit<'_>) -> [f64; 2] {
         self.extrema.map(|extremum| extremum.map_or(0.0, |seen| orbit.refined(seen).x))
     }
 }

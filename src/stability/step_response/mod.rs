@@ -9,7 +9,7 @@ mod integration;
 mod long_term;
 mod motion;
 mod orbit;
-mod scaled_block;
+pub(super) mod scaled_block;
 mod series;
 mod simulation;
 
@@ -17,13 +17,14 @@ use crate::model::{Law, StateLaw, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::protocol::Status;
 use crate::stability::SteadySliding;
+use long_term::LinearStability;
+use simulation::follow;
 
 pub use integration::{Integration, IntegrationStep, step_to};
-pub use long_term::LinearStability;
 pub use motion::StepResponseMotion;
 pub use orbit::{Cycle, Extremum, Orbit, RoughExtremum, SETTLED, StopReason};
 pub use scaled_block::{ScaledBlock, State, Z};
-pub use simulation::{LongTermBehaviour, Simulation, UnresolvedNumbers, follow};
+pub use simulation::{LongTermBehaviour, Simulation, UnresolvedNumbers};
 
 /// A step of the control velocity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,12 +142,7 @@ pub struct ScaledStep {
 impl ScaledStep {
     /// Simulates the response until its long-term behaviour is decided.
     pub fn follow(&self, rtol: f64) -> Simulation {
-        follow(&self.slider, self.linear(), ln(self.ratio), rtol)
-    }
-
-    /// Linear stability of steady sliding at the final velocity.
-    fn linear(&self) -> LinearStability {
-        LinearStability::of(&self.slider)
+        follow(&self.slider, ln(self.ratio), rtol)
     }
 
     /// Parameters as bits: the key of the memo.

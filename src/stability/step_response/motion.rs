@@ -1,12 +1,12 @@
 //! A response over time.
 
-use super::VelocityStep;
 use super::integration::{IntegrationStep, step_to};
-use super::scaled_block::{ScaledBlock, State, X, Y};
+use super::scaled_block::{State, X, Y};
+use super::{ScaledStep, VelocityStep};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss;
-use crate::protocol::{Moment, Motion};
+use crate::protocol::{Moment, Motion, equal_landmarks, interval_at};
 
 /// Intervals of a traced response, at most. Chosen: a limit of memory, far beyond the resolution of a picture.
 const MAX_INTERVALS: usize = 1 << 18;
@@ -48,14 +48,9 @@ impl VelocityStep {
     ///
     /// `None` for a rigid spring, for `v_i = v_f`, where the velocity becomes infinite, and for too many oscillations.
     pub fn motion(&self, t_f: f64, rtol: f64) -> Option<StepResponseMotion> {
-        let Transition { law, v_i, v_f } = self.transition;
-        let x = ln(v_i / v_f);
-        if !self.k.is_finite() || x == 0.0 {
-            return None;
-        }
-        let slider =
-            ScaledBlock { state_law: self.state_law, a: law.a, b: law.b, inertia: self.m * v_f * v_f, k: self.k };
-        let start = slider.steady(x);
+        let Transition { law, v_f, .. } = self.transition;
+        let ScaledStep { slider, ratio } = self.scaled()?;
+        let start = slider.steady(ln(ratio));
         let mut run = slider.run(start, slider.first_step(&start), 0.03 * rtol);
         let mut intervals = Vec::new();
         let end = t_f * v_f;
@@ -118,15 +113,12 @@ impl Motion for StepResponseMotion {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let count = self.intervals.len();
-        (0..=count).map(|k| k as f64 / count as f64).collect()
+        equal_landmarks(self.intervals.len())
     }
 
     fn at(&self, s: f64) -> Moment {
-        let count = self.intervals.len();
-        let along = s.clamp(0.0, 1.0) * count as f64;
-        let index = (along as usize).min(count - 1);
-        self.moment(self.intervals[index].at(along - index as f64))
+        let (k, u) = interval_at(s, self.intervals.len());
+        self.moment(self.intervals[k].at(u))
     }
 
     fn arrives(&self) -> bool {

@@ -56,9 +56,9 @@ pub const SETTLED: f64 = 0.01;
 /// Band of settled velocities: `ln(1 - SETTLED)` and `ln(1 + SETTLED)`.
 pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 
-/// Half widths of the windows of both refinements of an extremum, fractions of a step. Chosen: the error of the dense
+/// Half width of the windows of both refinements of an extremum, fraction of a step. Chosen: the error of the dense
 /// output, of order 5, is smaller at every tolerance.
-const POLISH_WINDOW: [f64; 2] = [0.125, 0.125];
+const POLISH_WINDOW: f64 = 0.125;
 
 /// Distance of an extremum from the edge of the band of settled velocities, relative to the edge, below which it is refined. Chosen: the error of the
 /// dense output is smaller.
@@ -271,10 +271,9 @@ impl<'a> Orbit<'a> {
     /// Refines an extremum by integration over ever shorter steps about it.
     pub fn refined(&mut self, RoughExtremum { rough, position }: RoughExtremum) -> Extremum {
         let Some((mut step, mut u)) = position else { return rough };
-        for window in POLISH_WINDOW {
-            let Some(refined_step) = substep(&mut self.run, &step, (u - window).max(0.0), u + window) else {
-                return rough;
-            };
+        for _ in 0..2 {
+            let (from, to) = ((u - POLISH_WINDOW).max(0.0), u + POLISH_WINDOW);
+            let Some(refined_step) = substep(&mut self.run, &step, from, to) else { return rough };
             let slopes = [refined_step.slope(X, 0.0), refined_step.slope(X, 1.0)];
             if slopes[0] * slopes[1] >= 0.0 {
                 break;

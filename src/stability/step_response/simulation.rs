@@ -63,7 +63,7 @@ pub struct UnresolvedNumbers {
 }
 
 /// Accuracies of the runs, in units of `rtol`. Derived: a change by `rtol` between two runs leaves a tenth of it as error.
-const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
+pub(super) const ACCURACIES: [f64; 4] = [3.0, 0.3, 0.03, 0.003];
 
 /// Difference of a logarithm between two runs, at least. Derived: rounding of a state of size 1 in 1e4 steps.
 pub(super) const MIN_DIFFERENCE: f64 = 1e-11;
@@ -75,7 +75,8 @@ pub(super) const UNDERFLOW_LN_V: f64 = -1000.0;
 ///
 /// Runs at ever tighter tolerances end where no number changes by more than `rtol`. Otherwise the response is `Undecided`,
 /// or the numbers that change are unresolved.
-pub fn follow(slider: &ScaledBlock, linear: LinearStability, x: f64, rtol: f64) -> Simulation {
+pub(super) fn follow(slider: &ScaledBlock, x: f64, rtol: f64) -> Simulation {
+    let linear = LinearStability::of(slider);
     if let Some(long_term) = without_simulation(slider, linear, x) {
         let unresolved = UnresolvedNumbers::default();
         return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, unresolved };

@@ -39,7 +39,7 @@ fn draw(random: &mut Random) -> Point {
     Point { case: Case { transition, t_f, tau_ceiling }, rtol: random.rtol() }
 }
 
-fn solve(family: &dyn Family, case: &Case, rtol: f64) -> Result<Shortcut, Obstacle> {
+fn solve(family: &Family, case: &Case, rtol: f64) -> Result<Shortcut, Obstacle> {
     family.solve(case, rtol, &mut SolverStats::default())
 }
 
@@ -77,7 +77,7 @@ fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {
         for (invariant, number) in numbers {
             let (rough, exact) = (number(&rough), number(&fine));
             // A velocity that friction determines carries the rounding of ln theta, b/a times.
-            let bounded = family.uses_tau_ceiling() && invariant != "work to rtol";
+            let bounded = family.uses_tau_ceiling && invariant != "work to rtol";
             let carried = if bounded { 2.0 * f64::EPSILON * b / a * logarithms } else { 0.0 };
             let allowed = allowed(family, case, (rough - exact) / exact, noise + carried, |s| number(s) / exact);
             row.agree(invariant, rough, exact, allowed);
@@ -91,8 +91,8 @@ fn examine(name: &str, points: u64, draw: fn(&mut Random) -> Point) {
 }
 
 /// What two numbers may differ by: `noise`, or what the last places of the inputs stand for if that is more, as far as there are members near.
-fn allowed(family: &dyn Family, case: &Case, found: f64, noise: f64, number: impl Fn(&Shortcut) -> f64) -> f64 {
-    if found.abs() <= noise || !family.uses_tau_ceiling() {
+fn allowed(family: &Family, case: &Case, found: f64, noise: f64, number: impl Fn(&Shortcut) -> f64) -> f64 {
+    if found.abs() <= noise || !family.uses_tau_ceiling {
         return noise;
     }
     let &Case { transition: Transition { law: Law { a, b }, v_i, v_f }, t_f, tau_ceiling } = case;
@@ -178,10 +178,10 @@ fn not_below_the_optimum(name: &str, case: &Case, found: &Shortcut, noise: f64, 
 }
 
 /// With `v_0` eight times less, as for the optimum.
-fn scaled(family: &dyn Family, case: &Case, fine: &Shortcut, terms: f64, row: &mut Row) {
+fn scaled(family: &Family, case: &Case, fine: &Shortcut, terms: f64, row: &mut Row) {
     let Transition { law: Law { a, b }, v_i, v_f } = case.transition;
     let s = 1.0 + (b - a) * 8f64.ln();
-    if s < 0.1 || (family.uses_tau_ceiling() && case.tau_ceiling - friction_of_ends(&case.transition) < 1e-9) {
+    if s < 0.1 || (family.uses_tau_ceiling && case.tau_ceiling - friction_of_ends(&case.transition) < 1e-9) {
         return;
     }
     let transition = Transition { law: Law { a: a / s, b: b / s }, v_i: 8.0 * v_i, v_f: 8.0 * v_f };

@@ -31,7 +31,7 @@ mod work_and_velocity;
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::{Transition, friction_margin};
 use crate::numerics::adaptive::integrals;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln_1p, ln_near_1};
 use crate::numerics::root::{Probe, newton};
 use crate::protocol::{Motion, SolverStats};
 use motion::BoundedFrictionMotion;
@@ -40,53 +40,43 @@ use path::{FrictionPath, PassFailure, PassResult, Residual, WorkTolerance};
 use work_and_velocity::WorkAndVelocity;
 
 /// The family `bounded_friction`.
-pub struct BoundedFriction;
+pub(super) const FAMILY: Family = Family {
+    name: "bounded_friction",
+    doc: "tau < tau_ceiling by construction, v continuous at both ends",
+    alpha: Some("alpha_3 in tau = tau_ceiling - (tau_ceiling - tau_i) R^x exp[alpha_3 x (1 - x)], x = t/t_f"),
+    uses_tau_ceiling: true,
+    arrives: true,
+    solve,
+    motion,
+};
 
-impl Family for BoundedFriction {
-    fn name(&self) -> &'static str {
-        "bounded_friction"
+fn solve(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
+    let (path, panels) = member(case, rtol, stats)?;
+    let WorkAndVelocity { work, v, .. } = match case.transition {
+        Transition { v_i, v_f, .. } if v_i == v_f => WorkAndVelocity::steady(&path, v_i),
+        transition => WorkAndVelocity::of(&transition, &path, &panels),
+    };
+    if !work.is_finite() {
+        return Err(Obstacle::NotConverged);
     }
+    Ok(Shortcut {
+        alpha: Some(if case.tau_ceiling == f64::INFINITY { 0.0 } else { path.alpha }),
+        work,
+        v_min: v.low,
+        v_max: v.high,
+        friction_max: path.friction_max().min(case.tau_ceiling),
+        friction_min: path.friction_min(),
+        miss: 0.0,
+    })
+}
 
-    fn doc(&self) -> &'static str {
-        "tau < tau_ceiling by construction, v continuous at both ends"
-    }
-
-    fn alpha(&self) -> Option<&'static str> {
-        Some("alpha_3 in tau = tau_ceiling - (tau_ceiling - tau_i) R^x exp[alpha_3 x (1 - x)], x = t/t_f")
-    }
-
-    fn uses_tau_ceiling(&self) -> bool {
-        true
-    }
-
-    fn solve(&self, case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Obstacle> {
-        let (path, panels) = member(case, rtol, stats)?;
-        let totals = match case.transition {
-            Transition { v_i, v_f, .. } if v_i == v_f => WorkAndVelocity::steady(&path, v_i),
-            transition => WorkAndVelocity::of(&transition, &path, &panels),
-        };
-        if !totals.work.is_finite() {
-            return Err(Obstacle::NotConverged);
-        }
-        Ok(Shortcut {
-            alpha: Some(if case.tau_ceiling == f64::INFINITY { 0.0 } else { path.alpha }),
-            work: totals.work,
-            v_min: totals.v_min,
-            v_max: totals.v_max,
-            friction_max: path.friction_max().min(case.tau_ceiling),
-            friction_min: path.friction_min(),
-            miss: 0.0,
-        })
-    }
-
-    fn motion(&self, case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
-        let (path, panels) = member(case, rtol, &mut SolverStats::default())?;
-        // Panels of backward integration come after those of forward integration, in reverse order.
-        let (mut panels, backward): (Vec<FrictionPanel>, Vec<FrictionPanel>) =
-            panels.into_iter().partition(|panel| panel.forward);
-        panels.extend(backward.into_iter().rev());
-        Ok(Box::new(BoundedFrictionMotion { path, panels }))
-    }
+fn motion(case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
+    let (path, panels) = member(case, rtol, &mut SolverStats::default())?;
+    // Panels of backward integration come after those of forward integration, in reverse order.
+    let (mut panels, backward): (Vec<FrictionPanel>, Vec<FrictionPanel>) =
+        panels.into_iter().partition(|panel| panel.forward);
+    panels.extend(backward.into_iter().rev());
+    Ok(Box::new(BoundedFrictionMotion { path, panels }))
 }
 
 /// Margin without a bound, in `mu_0 sigma`: stands for infinity. Chosen: far above every friction, and its square is a double.
@@ -113,18 +103,11 @@ const MAX_NOISE: f64 = 1e-9;
 /// Loosest accuracy of a solution. Measured: a looser one saves no time, and a few searches fail.
 const LOOSEST_RTOL: f64 = 1e-4;
 
-/// Whether the family is defined for a case.
-fn is_in_domain(case: &Case) -> bool {
-    let Transition { law, v_i, v_f } = case.transition;
-    let is_inside = law.a > 0.0 && law.b >= 0.0 && case.t_f > 0.0 && v_i >= 1.0 && v_f >= 1.0;
-    is_inside && [law.a, law.b, case.t_f, v_i, v_f].iter().all(|x| x.is_finite()) && !case.tau_ceiling.is_nan()
-}
-
 /// The path of the member that solves the case, and its panels.
 fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPath, Vec<FrictionPanel>), Obstacle> {
     let Transition { law, v_i, v_f } = case.transition;
     let (t_f, rtol) = (case.t_f, rtol.min(LOOSEST_RTOL));
-    if !is_in_domain(case) {
+    if case.tau_ceiling.is_nan() {
         return Err(Obstacle::Domain);
     }
     let unbounded = case.tau_ceiling == f64::INFINITY;
@@ -134,10 +117,10 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
         return Err(Obstacle::FrictionAtEnds { friction: case.tau_ceiling - margin_i.min(margin_f) });
     }
     let change = (v_i - v_f) / v_f;
-    let log_ratio = if change.abs() < 0.5 { ln_1p(change) } else { ln(v_i / v_f) };
+    let log_ratio = ln_near_1(change, v_i / v_f);
     let fraction = (law.a - law.b) * log_ratio / margin_i;
-    let ln_r = if fraction.abs() < 0.5 { ln_1p(fraction) } else { ln(margin_f / margin_i) };
-    let by_theta = FrictionPath::new(case, (margin_i, margin_f), ln_r, log_ratio, Residual::LnTheta);
+    let ln_r = ln_near_1(fraction, margin_f / margin_i);
+    let by_theta = FrictionPath::new(case, (margin_i, margin_f), ln_r, log_ratio);
     if v_i == v_f {
         let (_, panels) = last_pass(&by_theta, (rtol, 0.1 * rtol, 0.0), stats).map_err(|_| Obstacle::NotConverged)?;
         return Ok((by_theta, panels));
@@ -154,12 +137,12 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     if spare <= 0.0 {
         return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
-    let residual = if accelerates { Residual::TimeLoss { spare } } else { Residual::Slip { spare } };
-    let by_time = by_theta.with_residual(residual);
+    let residual = if accelerates { Residual::TimeLoss } else { Residual::Slip };
+    let by_time = by_theta.with_residual(residual, spare);
     let is_close = spare < SPARE_TIME_FRACTION * by_time.time_per_w(0.0).min(t_f);
     // From a standstill theta grows, and errors decay forwards.
     let by_time = if accelerates { by_time } else { by_time.towards(true) };
-    let both_ways = by_theta.towards(true).with_residual(Residual::TwoSidedSlip { spare });
+    let both_ways = by_theta.towards(true).with_residual(Residual::TwoSidedSlip, spare);
     // The loss of digits in a standstill grows with the ratio of the velocities, and b/a times where theta runs away.
     let far = log_ratio > MIN_LN_RATIO || log_ratio * law.b > MIN_LN_THETA_RATIO * law.a;
     let stands_still = !accelerates && far && t_f - spare > STANDSTILL_FRACTION * t_f;
@@ -168,7 +151,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     let mut order =
         if is_close { [&times, &thetas[..], both_ways].concat() } else { [&thetas, both_ways, &times].concat() };
     if stands_still {
-        order.sort_by_key(|path| !matches!(path.residual, Residual::TwoSidedSlip { .. }));
+        order.sort_by_key(|path| path.residual != Residual::TwoSidedSlip);
     }
     // Rounding of the time, at the greater velocity.
     let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
@@ -339,11 +322,11 @@ fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Opti
         let weight = (1.0 / scale).max(most / step.abs());
         Some(Probe { value: -step * weight, slope: weight })
     };
-    let far = ln_1p(4.0 * path.t_f / path.residual.spare().unwrap_or(f64::INFINITY));
+    let far = ln_1p(4.0 * path.t_f / path.spare);
     let (start, most) = match path.residual {
         Residual::LnTheta => (0.0, f64::INFINITY),
-        Residual::Slip { .. } | Residual::TwoSidedSlip { .. } => (far, MAX_ASINH_ALPHA),
-        Residual::TimeLoss { .. } => (-far, MAX_ASINH_ALPHA),
+        Residual::Slip | Residual::TwoSidedSlip => (far, MAX_ASINH_ALPHA),
+        Residual::TimeLoss => (-far, MAX_ASINH_ALPHA),
     };
     let root = newton(probe, start, (-most, most), false, SEARCH_RTOL)?;
     (!gave_up && errors <= max_growth).then(|| alpha_at(root.x))

@@ -3,7 +3,7 @@
 use super::panel::FrictionPanel;
 use super::path::{FrictionPath, PathEnd};
 use crate::numerics::elementary::exp;
-use crate::protocol::{Moment, Motion};
+use crate::protocol::{Moment, Motion, equal_landmarks, interval_at};
 
 /// Member as a motion: panels in the order of time, of equal length in the parameter `s`.
 pub(super) struct BoundedFrictionMotion {
@@ -17,15 +17,12 @@ impl Motion for BoundedFrictionMotion {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let count = self.panels.len();
-        (0..=count).map(|k| k as f64 / count as f64).collect()
+        equal_landmarks(self.panels.len())
     }
 
     fn at(&self, s: f64) -> Moment {
-        let count = self.panels.len();
-        let along = s.clamp(0.0, 1.0) * count as f64;
-        let k = (along as usize).min(count - 1);
-        let (panel, fraction) = (&self.panels[k], along - k as f64);
+        let (k, fraction) = interval_at(s, self.panels.len());
+        let panel = &self.panels[k];
         let path = self.path.towards(panel.forward);
         let fraction = if panel.forward { fraction } else { 1.0 - fraction };
         let (side, d, (w, z)) = (panel.side, panel.distance(fraction), panel.state(&path, fraction));

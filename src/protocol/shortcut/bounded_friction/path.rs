@@ -12,7 +12,7 @@
 use super::panel::{FrictionPanel, collocate};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
-use crate::numerics::radau::{NODES, Radau, radau};
+use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
 use crate::protocol::SolverStats;
 use crate::protocol::shortcut::Case;
 
@@ -43,26 +43,16 @@ pub(super) struct EndState {
 }
 
 /// Residual of a path at its end.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Residual {
     /// `ln theta` at the end.
     LnTheta,
     /// Near the time of `v = 0`: the slip in contact lifetimes, `int theta v dt`, compared with the spare time.
-    Slip { spare: f64 },
+    Slip,
     /// Near the time of `tau = tau_M`: the time lost to lower friction, compared with the spare time.
-    TimeLoss { spare: f64 },
+    TimeLoss,
     /// The slip in contact lifetimes from both ends to a point in a standstill, compared with the spare time.
-    TwoSidedSlip { spare: f64 },
-}
-
-impl Residual {
-    /// The spare time with which it compares.
-    pub fn spare(self) -> Option<f64> {
-        match self {
-            Residual::LnTheta => None,
-            Residual::Slip { spare } | Residual::TimeLoss { spare } | Residual::TwoSidedSlip { spare } => Some(spare),
-        }
-    }
+    TwoSidedSlip,
 }
 
 /// A member of the family for one `alpha_3`.
@@ -79,6 +69,8 @@ pub(super) struct FrictionPath {
     /// Size of `w`: the smaller of 1 and its change from end to end.
     pub size: f64,
     pub residual: Residual,
+    /// Spare time with which the residual is compared; infinite for [`Residual::LnTheta`].
+    pub spare: f64,
     /// The ends in the direction of integration.
     end_states: [EndState; 2],
 }
@@ -126,7 +118,7 @@ pub(super) enum PassFailure {
 const MAX_LN_THETA_FALL: f64 = 25.0;
 
 /// `-ln v` above which slip is negligible within any time. Chosen: `e^-100` is 3.7e-44, and a legal duration is at most 1e20.
-pub(super) const NEGLIGIBLE_LN_V: f64 = 100.0;
+const NEGLIGIBLE_LN_V: f64 = 100.0;
 
 /// `-ln v` above which the velocity is 0 in double precision. Derived: `e^-746` underflows.
 const UNDERFLOW_LN_V: f64 = 800.0;
@@ -141,7 +133,7 @@ pub(super) const MAX_EXPONENT: f64 = 400.0;
 const MAX_PANELS: usize = 4000;
 
 impl FrictionPath {
-    pub fn new(case: &Case, margins: (f64, f64), ln_r: f64, log_ratio: f64, residual: Residual) -> FrictionPath {
+    pub fn new(case: &Case, margins: (f64, f64), ln_r: f64, log_ratio: f64) -> FrictionPath {
         let Transition { law, v_i, v_f } = case.transition;
         let ratio = law.b / law.a;
         let end_state = |v: f64, margin: f64, l: f64, other: f64| {
@@ -163,7 +155,8 @@ impl FrictionPath {
         let ends = [end_state(v_i, margins.0, ln_r, log_ratio), end_state(v_f, margins.1, -ln_r, -log_ratio)];
         let end_states = if forward { ends } else { [ends[1], ends[0]] };
         let (kappa, size) = ((law.a - law.b) / law.a, log_ratio.abs().min(1.0));
-        FrictionPath { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, kappa, size, residual, end_states }
+        let (residual, spare) = (Residual::LnTheta, f64::INFINITY);
+        FrictionPath { alpha: 0.0, forward, t_f: case.t_f, a: law.a, ratio, kappa, size, residual, spare, end_states }
     }
 
     /// Scale of `alpha_3`: a change by it changes `ln v` by about a quarter.
@@ -198,9 +191,9 @@ impl FrictionPath {
         if self.forward == forward { self } else { self.reversed() }
     }
 
-    /// The path with another residual.
-    pub fn with_residual(self, residual: Residual) -> FrictionPath {
-        FrictionPath { residual, ..self }
+    /// The path with a residual that is compared with a spare time.
+    pub fn with_residual(self, residual: Residual, spare: f64) -> FrictionPath {
+        FrictionPath { residual, spare, ..self }
     }
 
     /// Quantities at an end.
@@ -218,10 +211,10 @@ impl FrictionPath {
                 let bent = -exp_m1(-end.w.max(-3.0));
                 (rise * bent, -bent / end.w_by_alpha)
             }
-            Residual::Slip { spare } | Residual::TwoSidedSlip { spare } | Residual::TimeLoss { spare } => {
-                let ln_ratio = ln(end.sum / spare);
+            Residual::Slip | Residual::TwoSidedSlip | Residual::TimeLoss => {
+                let ln_ratio = ln(end.sum / self.spare);
                 let step = ln_ratio * end.sum / (rise * self.time_per_w(end.w) * end.w_by_alpha);
-                if matches!(self.residual, Residual::TimeLoss { .. }) { (ln_ratio, -step) } else { (-ln_ratio, step) }
+                if self.residual == Residual::TimeLoss { (ln_ratio, -step) } else { (-ln_ratio, step) }
             }
         }
     }
@@ -230,10 +223,10 @@ impl FrictionPath {
     pub fn time_per_w(&self, w: f64) -> f64 {
         let theta = exp(w) / self.end_states[1].v;
         match self.residual {
-            Residual::TimeLoss { .. } => theta / exp_m1(self.ln_theta_v_at_ceiling(PathEnd::End, w)),
-            Residual::LnTheta | Residual::Slip { .. } => theta,
+            Residual::TimeLoss => theta / exp_m1(self.ln_theta_v_at_ceiling(PathEnd::End, w)),
+            Residual::LnTheta | Residual::Slip => theta,
             // This derivative is in units of time already.
-            Residual::TwoSidedSlip { .. } => 1.0,
+            Residual::TwoSidedSlip => 1.0,
         }
     }
 
@@ -250,7 +243,7 @@ impl FrictionPath {
     /// other residuals.
     pub fn lost_in_sum(&self, end: &PassResult) -> f64 {
         match self.residual {
-            Residual::TwoSidedSlip { .. } => self.rounding(end) / (1.0 + self.t_f / end.sum),
+            Residual::TwoSidedSlip => self.rounding(end) / (1.0 + self.t_f / end.sum),
             _ => 0.0,
         }
     }
@@ -353,7 +346,7 @@ impl FrictionPath {
         stats: &mut SolverStats,
     ) -> Result<(PassResult, Vec<FrictionPanel>), PassFailure> {
         let mut panels = Vec::new();
-        if !matches!(self.residual, Residual::TwoSidedSlip { .. }) {
+        if self.residual != Residual::TwoSidedSlip {
             let end = self.pass_one_way(None, tolerance, work, stats, &mut panels)?;
             return Ok((end, panels));
         }
@@ -463,7 +456,9 @@ impl FrictionPath {
                     let expected = expected.max(end.work + friction * found.slip).max(f64::MIN_POSITIVE);
                     error_ratio = error_ratio.max(end_lacks(friction * found.lack / expected / accuracy));
                 }
+                // The power 3/32 is close to the root of the order of the error at the end.
                 let change = root_of_order(1.0 / error_ratio.max(1e-20));
+                let change = change * change.sqrt();
                 if error_ratio > 1.0 {
                     h = length * (0.8 * change).clamp(0.2, 0.8);
                     continue;
@@ -546,20 +541,22 @@ impl FrictionPath {
 
     /// Integral of the residual over a panel, and its error estimate in units of the spare time.
     fn residual_contribution(&self, panel: &FrictionPanel, rule: &Radau) -> (f64, f64) {
-        let Some(spare) = self.residual.spare() else { return (0.0, 0.0) };
+        if self.residual == Residual::LnTheta {
+            return (0.0, 0.0);
+        }
         let scale = self.t_f * (panel.to - panel.from).abs();
         let mut values = [0.0; NODES];
         for ((value, &node), &w) in values.iter_mut().zip(&rule.u).zip(&panel.w) {
             let d = panel.distance(node);
             *value = scale
-                * if matches!(self.residual, Residual::TimeLoss { .. }) {
+                * if self.residual == Residual::TimeLoss {
                     exp_m1(-self.margin_at(panel.side, d) / self.a) / exp_m1(-self.ln_theta_v_at_ceiling(panel.side, w))
                 } else {
                     exp(self.ln_theta_v(panel.side, d, w))
                 };
         }
         let contribution = values.iter().zip(&rule.w).map(|(value, w)| value * w).sum();
-        (contribution, rule.unresolved(&values) / spare)
+        (contribution, rule.unresolved(&values) / self.spare)
     }
 
     /// Intervals in the direction of integration, with whether slip is negligible there: from the start to the middle and
@@ -620,9 +617,3 @@ const GRADING_RATIO: f64 = 0.8;
 
 /// Exponent over a panel that quadrature at its nodes resolves, at most. Chosen; the budgets of `shortcut` judge it.
 pub(super) const MAX_QUADRATURE_EXPONENT: f64 = 6.0;
-
-/// Growth of a panel for a growth `x` of its error: `x^(3/32)`, close to the root of the order.
-fn root_of_order(x: f64) -> f64 {
-    let sixteenth = x.sqrt().sqrt().sqrt().sqrt();
-    sixteenth * sixteenth.sqrt()
-}

@@ -4,13 +4,13 @@ use super::panel::FrictionPanel;
 use super::path::{FrictionPath, PathEnd};
 use crate::model::Transition;
 use crate::numerics::radau::{NODES, radau};
+use crate::protocol::control::ValueRange;
 
 /// Work and range of the velocity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WorkAndVelocity {
     pub work: f64,
-    pub v_min: f64,
-    pub v_max: f64,
+    pub v: ValueRange,
     /// Whether the velocity rises at the end of the last panel, and its value there.
     last: Option<(bool, f64)>,
 }
@@ -19,14 +19,16 @@ impl WorkAndVelocity {
     /// Work and velocity of a transition along the panels of a pass.
     pub fn of(transition: &Transition, path: &FrictionPath, panels: &[FrictionPanel]) -> WorkAndVelocity {
         let Transition { v_i, v_f, .. } = *transition;
-        let mut all = WorkAndVelocity { work: 0.0, v_min: v_i.min(v_f), v_max: v_i.max(v_f), last: None };
+        let v = ValueRange { low: v_i.min(v_f), high: v_i.max(v_f) };
+        let mut all = WorkAndVelocity { work: 0.0, v, last: None };
         panels.iter().for_each(|panel| all.add(&path.towards(panel.forward), panel));
         all
     }
 
     /// Work and velocity of steady sliding.
     pub fn steady(path: &FrictionPath, v: f64) -> WorkAndVelocity {
-        WorkAndVelocity { work: path.friction(PathEnd::Start, 0.0) * v * path.t_f, v_min: v, v_max: v, last: None }
+        let work = path.friction(PathEnd::Start, 0.0) * v * path.t_f;
+        WorkAndVelocity { work, v: ValueRange { low: v, high: v }, last: None }
     }
 
     /// Adds one panel.
@@ -40,7 +42,7 @@ impl WorkAndVelocity {
             self.last = None;
         }
         if let Some((_, v)) = self.last.filter(|&(rises, _)| rises != (bend_before > 0.0)) {
-            self.add_velocity(v);
+            self.v.add(v);
         }
         for j in 0..NODES {
             let (d, w, z) = (panel.distance(rule.u[j]), panel.w[j], panel.z[j]);
@@ -73,13 +75,7 @@ impl WorkAndVelocity {
             }
         }
         let (w, z) = panel.state(path, low);
-        self.add_velocity(path.velocity(panel.side, w, z));
-    }
-
-    /// Extends the range to a velocity.
-    fn add_velocity(&mut self, v: f64) {
-        self.v_min = self.v_min.min(v);
-        self.v_max = self.v_max.max(v);
+        self.v.add(path.velocity(panel.side, w, z));
     }
 }
 

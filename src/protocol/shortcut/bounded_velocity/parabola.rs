@@ -20,6 +20,8 @@ impl Parabola {
 }
 
 impl Exponent for Parabola {
+    const INTERPOLATION: f64 = 0.75;
+
     fn with(self, c: f64) -> Parabola {
         Parabola { c, ..self }
     }
