@@ -48,10 +48,7 @@ impl Scale {
     /// The scale of `values`: logarithmic if they are positive and span a large ratio. Rounded zeros do not extend it. `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Scale> {
         let finite: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
-        let span = |values: &mut dyn Iterator<Item = f64>| {
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-        };
-        let (low, high) = span(&mut finite.iter().copied());
+        let (low, high) = range(finite.iter().copied());
         if low > high {
             return None;
         }
@@ -60,7 +57,7 @@ impl Scale {
             return Some(linear);
         }
         let zero = rounding(&finite, high);
-        let (least, _) = span(&mut finite.iter().copied().filter(|value| *value > zero));
+        let (least, _) = range(finite.iter().copied().filter(|value| *value > zero));
         let ratio = if low == 0.0 { LOG_RATIO_WITH_ZERO } else { LOG_RATIO };
         Some(if high / least >= ratio { Scale { low: least, high, log: true } } else { linear })
     }
@@ -174,6 +171,11 @@ impl Scale {
         }
         Ticks { ticks, power: 0 }
     }
+}
+
+/// The least and the greatest value; `(inf, -inf)` without values.
+pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// The greatest of the values that are rounded zeros; 0 if there are none.
