@@ -184,15 +184,10 @@ fn rounding(values: &[f64], high: f64) -> f64 {
     let decade = |value: f64| (high.log10() - value.log10()).floor().clamp(0.0, 639.0) as usize;
     let mut used = [false; 640];
     values.iter().filter(|value| **value > 0.0).for_each(|value| used[decade(*value)] = true);
-    let mut empty = 0;
-    for (place, is_used) in used.into_iter().enumerate() {
-        empty = if is_used { 0 } else { empty + 1 };
-        if empty == EMPTY_DECADES {
-            let zeros = values.iter().copied().filter(|value| *value <= ROUNDING_RTOL * high && decade(*value) > place);
-            return zeros.fold(0.0, f64::max);
-        }
-    }
-    0.0
+    let used: Vec<usize> = (0..used.len()).filter(|&decade| used[decade]).collect();
+    let Some(gap) = used.windows(2).find(|pair| pair[1] - pair[0] > EMPTY_DECADES) else { return 0.0 };
+    let zeros = values.iter().copied().filter(|value| *value <= ROUNDING_RTOL * high && decade(*value) >= gap[1]);
+    zeros.fold(0.0, f64::max)
 }
 
 /// Whether ascending values are better shown on a logarithmic scale: their ratios are equal, or their range is large.

@@ -148,7 +148,6 @@ impl Raster {
         let labels = if is_named { filtered.label_columns() } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
         let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
-        let ok = Status::ALL.iter().position(|status| *status == Status::Ok).unwrap_or(0) as f64;
         filtered.each(&wanted, |row| {
             let &[x, y, found, status, ref rest @ ..] = row else { return };
             let (key, labels) = rest.split_at(axes.len());
@@ -170,7 +169,10 @@ impl Raster {
                 sheet.value[cell] = found;
                 sheet.status[cell] = status.min((Status::ALL.len() - 1) as f64) as u8 + 1;
             }
-            if status == ok && !found.is_nan() && sheet.least.is_none_or(|(.., least)| found < least) {
+            if status == f64::from(Status::Ok as u8)
+                && !found.is_nan()
+                && sheet.least.is_none_or(|(.., least)| found < least)
+            {
                 sheet.least = Some((x, y, found));
             }
         })?;
