@@ -249,24 +249,11 @@ impl Entry {
 
 /// A figure as SVG, with the positions of its maps.
 #[derive(Debug, Clone)]
-pub struct SvgFigure {
+pub struct SvgFigure<'a> {
     /// The picture.
     pub svg: String,
-    /// Maps with values, and their positions in the picture.
-    pub hovers: Vec<HoverMap>,
-}
-
-/// A map with values in a picture.
-#[derive(Debug, Clone)]
-pub struct HoverMap {
-    /// Its position.
-    pub area: Area,
-    /// Its horizontal axis.
-    pub x: Axis,
-    /// Its vertical axis.
-    pub y: Axis,
-    /// Its values.
-    pub hover: Hover,
+    /// The maps: position in the picture, panel and values.
+    pub maps: Vec<(Area, &'a Panel, &'a Hover)>,
 }
 
 /// The ticks of a panel, and whether its axes are labelled.
@@ -290,7 +277,7 @@ struct Layout {
 
 impl Figure {
     /// Draws the figure, `width` millimetres wide.
-    pub fn draw(&self, width: f64) -> SvgFigure {
+    pub fn draw(&self, width: f64) -> SvgFigure<'_> {
         let width = width * MILLIMETRE;
         let mut canvas = Canvas::default();
         let inner = width - 2.0 * MARGIN;
@@ -302,12 +289,12 @@ impl Figure {
         }
         let as_powers = self.as_powers();
         let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width(as_powers));
-        let (mut foot, hovers) = self.draw_panels(&mut canvas, top, inner - bar - self.row_title_width(), as_powers);
+        let (mut foot, maps) = self.draw_panels(&mut canvas, top, inner - bar - self.row_title_width(), as_powers);
         for note in &self.notes {
             foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
         }
         let height = foot + MARGIN;
-        SvgFigure { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
+        SvgFigure { svg: canvas.svg(width, height, &label::plain(&self.title)), maps }
     }
 
     /// Draws the legend below `top`; returns its lower edge.
@@ -383,12 +370,18 @@ impl Figure {
     }
 
     /// Draws the panels and the colour bar; returns their lower edge, and the maps.
-    fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64, as_powers: bool) -> (f64, Vec<HoverMap>) {
+    fn draw_panels(
+        &self,
+        canvas: &mut Canvas,
+        top: f64,
+        inner: f64,
+        as_powers: bool,
+    ) -> (f64, Vec<(Area, &Panel, &Hover)>) {
         let layout = self.layout(inner, as_powers);
         let Layout { width, height, .. } = layout;
         let columns = layout.lefts.len();
         let mut y = top;
-        let mut hovers = Vec::new();
+        let mut maps = Vec::new();
         for (row, panels) in self.panels.chunks(columns).enumerate() {
             y += layout.aboves[row];
             let mut x = MARGIN;
@@ -396,11 +389,10 @@ impl Figure {
                 x += layout.lefts[column];
                 let area = Area { x, y, width, height };
                 panel.draw(canvas, area, &layout.ticks[row * columns + column], layout.lefts[column]);
-                for layer in &panel.layers {
-                    if let Layer::Map(_, hover) = layer {
-                        hovers.push(HoverMap { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
-                    }
-                }
+                maps.extend(panel.layers.iter().filter_map(|layer| match layer {
+                    Layer::Map(_, hover) => Some((area, panel, hover)),
+                    _ => None,
+                }));
                 x += width + layout.rights[column];
             }
             if let Some(title) = self.rows.get(row) {
@@ -415,7 +407,7 @@ impl Figure {
             let x = MARGIN + inner + self.row_title_width() + BAR_SPACE;
             colours.draw(canvas, Area { x, y: first, width: BAR_WIDTH, height: tall }, as_powers);
         }
-        (y, hovers)
+        (y, maps)
     }
 }
 
