@@ -1,6 +1,6 @@
 //! Pictures of time against error: a panel for each kind of cases, a line with marks for each method.
 
-use slipsweep::plot::{Axis, Entry, Figure, Key, Layer, PAGE, Panel, Scale, Symbol, series};
+use slipsweep::plot::{Axis, Entry, Figure, Key, Layer, PAGE, Panel, Scale, series};
 
 use super::measure::Record;
 
@@ -32,16 +32,11 @@ pub fn draw(title: &str, error: &str, records: &[&Record]) -> Option<String> {
             let line: Vec<(f64, f64)> =
                 records.iter().filter(of_line).filter(seen).map(|record| place(record)).collect();
             layers.push(Layer::Line(line.clone(), series(series_place)));
-            layers.push(Layer::Marks(line.into_iter().map(|at| (at, Symbol::of_series(series_place))).collect()));
+            layers.push(Layer::marks(line, series_place));
         }
         // What is ours is drawn last, on top.
         layers.rotate_left(2);
-        Panel {
-            title: kind.to_owned(),
-            x: Axis { column: "error".into(), unit: "1".into(), scale: x },
-            y: Axis { column: "time a case".into(), unit: "ns".into(), scale: y },
-            layers,
-        }
+        Panel { title: kind.to_owned(), x: Axis::new("error", "1", x), y: Axis::new("time a case", "ns", y), layers }
     });
     let panels: Vec<Panel> = panels.collect();
     let mut notes = Vec::new();
@@ -56,10 +51,7 @@ pub fn draw(title: &str, error: &str, records: &[&Record]) -> Option<String> {
             }
         }
     }
-    let entry = |(place, method): (usize, &&str)| Entry {
-        key: Key::Marked(series(place), Symbol::of_series(place)),
-        text: (*method).to_owned(),
-    };
+    let entry = |(place, method): (usize, &&str)| Entry { key: Key::series(place, true), text: (*method).to_owned() };
     let figure = Figure {
         title: title.to_owned(),
         subtitle: format!(

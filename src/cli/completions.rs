@@ -17,10 +17,6 @@ pub struct Arguments {
 }
 
 /// Prints the completions of a shell.
-///
-/// # Errors
-///
-/// The output cannot be written.
 pub fn completions(arguments: &Arguments) -> Result<(), Failure> {
     let mut text = Vec::new();
     clap_complete::generate(arguments.shell, &mut super::Arguments::command(), "slipsweep", &mut text);

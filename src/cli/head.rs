@@ -62,7 +62,7 @@ fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
                 Ok(())
             })
             .map_err(|error| unreadable(&arguments.dataset, &error))?;
-        let lines = under(source.columns.clone(), source.units.clone(), rows);
+        let lines = words::headed(source.columns.clone(), source.units.clone(), rows);
         Ok(Head { name: source.name.clone(), lines, rows: source.rows, missing: source.missing })
     };
     chosen(arguments, &names)?.into_iter().map(|place| first(&tables.sources[place])).collect()
@@ -93,7 +93,7 @@ fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
             );
         }
         let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
-        let lines = under(names, units, rows);
+        let lines = words::headed(names, units, rows);
         heads.push(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing });
     }
     Ok(heads)
@@ -104,12 +104,6 @@ fn chosen(arguments: &Arguments, names: &[&str]) -> Result<Vec<usize>, Failure> 
     let Some(name) = &arguments.table else { return Ok((0..names.len()).collect()) };
     let place = names.iter().position(|known| known == name);
     place.map(|place| vec![place]).ok_or_else(|| no_table(&format!("{}: ", arguments.dataset.display()), name, names))
-}
-
-/// Rows under their names and, if there are any, units.
-fn under(names: Vec<String>, units: Vec<String>, rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
-    let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
-    std::iter::once(names).chain(units).chain(rows).collect()
 }
 
 impl Head {

@@ -76,9 +76,9 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
     let path = folder.join(format!("{name}.toml"));
+    let has = |path: &Path, text: &str| file::open(path).and_then(io::read_to_string).is_ok_and(|found| found == text);
     // A spec that equals the new one is no conflict.
-    let found = file::open(&path).and_then(io::read_to_string);
-    if path.exists() && !found.is_ok_and(|found| found == text) {
+    if path.exists() && !has(&path, &text) {
         let found = format!("{}: exists already", path.display());
         return Err(refused(found, "a new name", "choose another name, or remove the file"));
     }
@@ -89,7 +89,7 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
     let schema_path = folder.join(SCHEMA);
     let schema = format!("{:#}\n", schema());
     // A schema of another version would report valid keys of this version as errors.
-    if !file::open(&schema_path).and_then(io::read_to_string).is_ok_and(|found| found == schema) {
+    if !has(&schema_path, &schema) {
         write(&schema_path, &schema)?;
     }
     write(&path, &text)?;

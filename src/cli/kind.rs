@@ -211,14 +211,16 @@ fn has_columns_of_trace(path: &Path) -> bool {
 
 /// Whether a text is a spec although the name of its file does not end like one.
 fn is_spec(text: &[u8]) -> bool {
-    let table: Option<toml::Table> = std::str::from_utf8(text).ok().and_then(|text| text.parse().ok());
-    table.is_some_and(|table| ["axes", "tables", "block"].iter().any(|key| table.contains_key(*key)))
+    toml_of(text).is_some_and(|table| ["axes", "tables", "block"].iter().any(|key| table.contains_key(*key)))
+}
+
+fn toml_of(text: &[u8]) -> Option<toml::Table> {
+    std::str::from_utf8(text).ok()?.parse().ok()
 }
 
 /// The default dataset of a spec.
 fn results(spec: &Path) -> String {
-    let text = start(spec).ok().and_then(|text| String::from_utf8(text).ok());
-    let table: Option<toml::Table> = text.and_then(|text| text.parse().ok());
+    let table = start(spec).ok().and_then(|text| toml_of(&text));
     let name = table.as_ref().and_then(|table| table.get("name")).and_then(toml::Value::as_str);
     format!("results/{}", name.unwrap_or("NAME"))
 }

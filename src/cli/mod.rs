@@ -39,7 +39,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, Parser, Subcommand};
 
-use self::watch::{Wait, waiting};
+use self::watch::waiting;
 use crate::dataset::{Folder, Manifest, atomic};
 use crate::names::{hint, nearest};
 #[cfg(feature = "query")]
@@ -212,9 +212,14 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
 /// The resolved path of a file, and its folder.
 fn real(out: &Path) -> (PathBuf, PathBuf) {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = real.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = parent(&real);
     let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
     (real, folder)
+}
+
+/// The folder of a path; of a bare name, the current one.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Refuses to replace a part or the manifest of a dataset.
@@ -301,7 +306,7 @@ fn suggested(mut error: clap::Error) -> clap::Error {
 /// Reads and checks the spec in `path`; prints warnings.
 fn load(path: &Path) -> Result<Sweep, Failure> {
     kind::expect_spec(path)?;
-    let sweep = waiting(&Wait::new("reading the spec"), || Sweep::load(path))?;
+    let sweep = waiting("reading the spec", || Sweep::load(path))?;
     for warning in &sweep.warnings {
         let _ = writeln!(io::stderr(), "warning: {warning}");
     }
@@ -342,11 +347,8 @@ pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
             note(&folder, &manifest);
             Ok((folder, manifest))
         }
-        None => Err(refused(
-            format!("{}: not a dataset", path.display()),
-            "a folder with a manifest.json, or with at least one part",
-            "name a folder that `slipsweep run` wrote",
-        )),
+        // It was removed in the meantime.
+        None => Err(kind::unexpected(path, &[Kind::Dataset])),
     }
 }
 

@@ -9,7 +9,7 @@ use super::{Failure, wrong};
 
 /// A format of answers.
 pub trait Format: ValueEnum + Copy + PartialEq + Send + Sync + 'static {
-    /// The formats with the endings of their files; the first ending of a format is the usual one.
+    /// The formats with the endings of their files, those of a format together, the usual one first.
     const ENDINGS: &'static [(&'static str, Self)];
     /// Text for a terminal.
     const TABLE: Self;
@@ -47,11 +47,9 @@ impl<F: Format> Output<F> {
             (None, None) if self.is_stdout() => F::TABLE,
             (None, None) => {
                 let name = self.out.display();
-                let usual = F::ENDINGS
-                    .iter()
-                    .enumerate()
-                    .filter(|(place, (_, format))| F::ENDINGS[..*place].iter().all(|(_, other)| other != format));
-                let usual: Vec<String> = usual.map(|(_, (ending, _))| format!(".{ending}")).collect();
+                let mut usual = F::ENDINGS.to_vec();
+                usual.dedup_by_key(|(_, format)| *format);
+                let usual: Vec<String> = usual.iter().map(|(ending, _)| format!(".{ending}")).collect();
                 return Err(wrong(format!(
                     "--out {name}: the ending is none of {}\n  help: add --format",
                     usual.join(", ")

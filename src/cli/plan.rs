@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 use std::time::Instant;
 
-use super::watch::{Wait, waiting};
+use super::watch::waiting;
 use super::{Failure, load, say, words};
 use crate::dataset::atomic::nearest_folder;
 use crate::sweep::{Estimates, Plan, Sweep, estimate};
@@ -34,8 +34,7 @@ pub fn plan(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
     let sweep = load(&arguments.spec)?;
     let reading = start.elapsed().as_secs_f64();
-    let sample = Wait::new("computing a sample");
-    let estimates = waiting(&sample, || estimate(&sweep, &arguments.out)).map_err(Failure::failed)?;
+    let estimates = waiting("computing a sample", || estimate(&sweep, &arguments.out)).map_err(Failure::failed)?;
     let mut text = format!("{}\n{}", sweep.name, in_words(&sweep, &estimates, reading));
     if let Ok(free) = fs4::available_space(nearest_folder(&arguments.out)) {
         let (bytes, free) = (estimates.bytes(), free as f64);

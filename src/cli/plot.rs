@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
-use super::watch::{Wait, waiting};
+use super::watch::waiting;
 use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, refused, say, write_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
@@ -44,27 +44,17 @@ pub struct Arguments {
     #[arg(long, value_name = "FORMAT", value_enum)]
     format: Option<Format>,
     /// Width in millimetres: 89 for one column of a journal, 183 for two [default: by the number of panels]
-    #[arg(long, value_name = "MM", value_parser = width)]
+    #[arg(long, value_name = "MM", value_parser = |text: &str| in_range(text, 50.0, 1000.0))]
     width: Option<f64>,
     /// Pixels per inch of a .png
-    #[arg(long, value_name = "N", default_value = "300", value_parser = dpi)]
+    #[arg(long, value_name = "N", default_value = "300", value_parser = |text: &str| in_range(text, 20.0, 2400.0))]
     dpi: f64,
 }
 
-fn width(text: &str) -> Result<f64, String> {
-    in_range(text, 50.0, 1000.0)
-}
-
-fn dpi(text: &str) -> Result<f64, String> {
-    in_range(text, 20.0, 2400.0)
-}
-
+/// Parses a number from `least` to `most`.
 fn in_range(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let range = format!("expected a number from {least} to {most}");
-    match text.parse() {
-        Ok(value) if (least..=most).contains(&value) => Ok(value),
-        _ => Err(range),
-    }
+    let number = text.parse().ok().filter(|number| (least..=most).contains(number));
+    number.ok_or_else(|| format!("expected a number from {least} to {most}"))
 }
 
 impl From<PlotError> for Failure {
@@ -97,11 +87,10 @@ pub fn plot(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Destination of pictures.
+/// Destination of pictures: a folder, or the file of a single one.
 struct OutputTarget {
-    /// The file, if one was named.
-    file: Option<PathBuf>,
-    folder: PathBuf,
+    path: PathBuf,
+    is_file: bool,
     format: Format,
 }
 
@@ -132,7 +121,7 @@ impl Arguments {
             None => source.tables(),
         };
         if tables.len() > 1
-            && let Some(flag) = self.given(("--out FILE", place.file.is_some()))
+            && let Some(flag) = self.given(("--out FILE", place.is_file))
         {
             let tables = tables.join(", ");
             return Err(wrong(format!(
@@ -142,8 +131,7 @@ impl Arguments {
         let (mut damage, mut pictures) = (None, 0);
         for table in &tables {
             let drawing = format!("drawing {table}");
-            let drawn = waiting(&Wait::new(&drawing), || source.figure(table, &request)).map_err(Failure::from);
-            let figure = match drawn {
+            let figure = match waiting(&*drawing, || source.figure(table, &request)).map_err(Failure::from) {
                 // A table without a picture does not prevent the pictures of other tables.
                 Err(failure) if tables.len() > 1 && failure.code == EXIT_FAILURE => {
                     damage = damage.or(Some(failure));
@@ -174,41 +162,39 @@ impl Arguments {
     }
 
     fn request(&self) -> Result<Request, Failure> {
-        let mut conditions = Vec::new();
-        for text in &self.conditions {
-            conditions.extend(Condition::all(text)?);
-        }
+        let conditions =
+            self.conditions.iter().map(|text| Condition::all(text)).collect::<Result<Vec<_>, _>>()?.concat();
         Ok(Request { conditions, x: self.x.clone(), y: self.y.clone(), colour: self.color.clone() })
     }
 
     /// Destination and format of the pictures.
     fn place(&self) -> Result<OutputTarget, Failure> {
         let format = self.format.unwrap_or(Format::Svg);
-        let Some(out) = &self.out else { return Ok(OutputTarget { file: None, folder: PathBuf::new(), format }) };
-        let shown = out.display();
-        if out.is_dir() || out.extension().is_none() {
-            return Ok(OutputTarget { file: None, folder: out.clone(), format });
+        let path = self.out.clone().unwrap_or_default();
+        if path.is_dir() || path.extension().is_none() {
+            return Ok(OutputTarget { path, is_file: false, format });
         }
-        match (Format::of(out), self.format) {
+        let shown = path.display();
+        match (Format::of(&path), self.format) {
             (None, _) => Err(wrong(format!(
                 "--out {shown}: the name ends in none of .svg, .png, .pdf\n  help: end it in one of these; for a folder, make it first"
             ))),
             (Some(named), Some(given)) if named != given => Err(wrong(format!(
                 "--out {shown}: the ending contradicts --format\n  help: leave out --format, or name a folder"
             ))),
-            (Some(format), _) => Ok(OutputTarget { file: Some(out.clone()), folder: PathBuf::new(), format }),
+            (Some(format), _) => Ok(OutputTarget { path, is_file: true, format }),
         }
     }
 
     /// Writes a figure and returns its path.
     fn write(&self, figure: &Figure, stem: &str, place: &OutputTarget) -> Result<PathBuf, Failure> {
-        let path = match &place.file {
-            Some(file) => file.clone(),
-            None => place.folder.join(format!("{stem}.{}", place.format.ending())),
+        let path = match place.is_file {
+            true => place.path.clone(),
+            false => place.path.join(format!("{stem}.{}", place.format.ending())),
         };
         let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
         let encode = || place.format.encode(&figure.draw(width).svg, self.dpi);
-        let bytes = waiting(&Wait::new("writing the picture"), encode)?;
+        let bytes = waiting("writing the picture", encode)?;
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|error| cannot_write(&path, &error))?;
         }

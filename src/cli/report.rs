@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::summary::SummaryBlock;
-use super::watch::{Wait, waiting};
+use super::watch::waiting;
 use super::{Failure, dataset, keep_datasets, plan, refused, say, summary, words, write_file};
 use crate::dataset::TableSurvey;
 use crate::plot::table::{Request, Source};
@@ -63,7 +63,7 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
     page.heading("Pictures");
     for table in source.tables() {
         let drawing = format!("drawing {table}");
-        match waiting(&Wait::new(&drawing), || source.figure(&table, &Request::default())) {
+        match waiting(&*drawing, || source.figure(&table, &Request::default())) {
             Ok(figure) => {
                 page.picture(&figure.draw(if figure.columns > 1 { PAGE } else { COLUMN }));
                 figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));
@@ -120,8 +120,7 @@ fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
     page.heading("Plan");
     match Sweep::parse_at(spec, &folder.join("manifest.json")) {
         Ok(sweep) => {
-            let sample = Wait::new("computing a sample");
-            let estimates = waiting(&sample, || estimate(&sweep, folder)).map_err(Failure::failed)?;
+            let estimates = waiting("computing a sample", || estimate(&sweep, folder)).map_err(Failure::failed)?;
             page.verbatim(&plan::in_words(&sweep, &estimates, 0.0));
         }
         // The dataset does not contain points files.

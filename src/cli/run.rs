@@ -10,7 +10,7 @@ use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{Wait, waiting, watched};
 use super::{
-    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, refused, say, summary, whole, words, wrong,
+    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, parent, refused, say, summary, whole, words, wrong,
 };
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
@@ -59,8 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(refused(found, "a folder, which the run makes if it is missing", "name a folder"));
     }
     let (sweep, folder) = subject(arguments)?;
-    let planning = Wait { quiet: arguments.quiet, ..Wait::new("planning the sweep") };
-    let (plan, parts) = waiting(&planning, || {
+    let planning = Wait { quiet: arguments.quiet, .."planning the sweep".into() };
+    let (plan, parts) = waiting(planning, || {
         let plan = Plan::new(&sweep);
         let parts = arguments.shard.unwrap_or(Shard::WHOLE).parts(&sweep, &plan).map_err(wrong)?;
         check_room(&sweep, &plan, &parts, &folder)?;
@@ -195,7 +195,7 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
         return Err(wrong(format!("{}: {message}\n  help: run the spec file of this dataset", path.display())));
     }
     let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).map_err(|error| {
-        let out = path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")).display();
+        let out = parent(path).display();
         let what = format!("{}: its spec refers to files that are not in the dataset", path.display());
         let help = format!("run the spec file: slipsweep run SPEC --out {out}");
         wrong(format!("{what}\n  found: {error}\n  help: {help}"))

@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clap::ValueEnum;
+
 use super::{Failure, load, say, to_file, whole, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
@@ -39,7 +41,7 @@ fn minutes(text: &str) -> Result<f64, String> {
 }
 
 /// A scheduler with array jobs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Engine {
     /// Slurm: `sbatch`
     Slurm,
@@ -51,8 +53,6 @@ pub enum Engine {
 const SHARDS: &str = "# shards: ";
 
 impl Engine {
-    const ALL: [Engine; 2] = [Engine::Slurm, Engine::Hyperqueue];
-
     fn name(self) -> &'static str {
         match self {
             Engine::Slurm => "slurm",
@@ -69,14 +69,12 @@ impl Engine {
 
     /// The command that submits `script`, or only some shards of it.
     fn submit(self, script: &Path, shards: Option<&[u64]>) -> String {
-        let script = quoted(script);
-        let array = shards.map(|shards| words::ranges(shards.iter().copied()));
-        match (self, array) {
-            (Engine::Slurm, None) => format!("sbatch {script}"),
-            (Engine::Slurm, Some(array)) => format!("sbatch --array={array} {script}"),
-            (Engine::Hyperqueue, None) => format!("hq submit {script}"),
-            (Engine::Hyperqueue, Some(array)) => format!("hq submit --array={array} {script}"),
-        }
+        let submit = match self {
+            Engine::Slurm => "sbatch",
+            Engine::Hyperqueue => "hq submit",
+        };
+        let array = shards.map(|shards| format!(" --array={}", words::ranges(shards.iter().copied())));
+        format!("{submit}{} {}", array.unwrap_or_default(), quoted(script))
     }
 
     /// Greatest number of tasks of an array. Slurm limits the index of a task, by default to 1000.
@@ -90,7 +88,7 @@ impl Engine {
 
 /// The job scripts of `dataset`: for each, the number of shards and the command that submits some of them.
 pub fn scripts(dataset: &Path) -> Vec<(u64, impl Fn(&[u64]) -> String)> {
-    let scripts = Engine::ALL.into_iter().filter_map(|engine| {
+    let scripts = Engine::value_variants().iter().filter_map(|engine| {
         let path = engine.script(dataset);
         let text = fs::read_to_string(&path).ok()?;
         let count: u64 = text.lines().find_map(|line| line.strip_prefix(SHARDS))?.parse().ok()?;

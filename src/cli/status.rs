@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{EXIT_FAILURE, Failure, kind, refused, say, summary, words};
-use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey};
+use super::{EXIT_FAILURE, Failure, kind, parent, refused, say, summary, words};
+use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey, TableSurvey};
 use crate::sweep::{Plan, Sweep, shards_with};
 
 /// Arguments of `status`.
@@ -90,15 +90,16 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
         let more = if table.missing.len() > MAX_LISTED { ", …" } else { "" };
         format!("{}: {}{more}", table.name, first.collect::<Vec<_>>().join(","))
     });
-    let damaged =
-        tables().flat_map(|table| table.damaged.iter().map(|(part, why)| (folder.part(&table.name, *part), why)));
-    let damaged = damaged.map(|(path, why)| format!("{}: {why}", path.display()));
-    let foreign =
-        tables().flat_map(|table| table.foreign.iter().map(|(part, is)| (folder.part(&table.name, *part), is)));
-    let foreign = foreign.map(|(path, [what, expected, found])| {
-        format!("{}: belongs to another {what}\n    expected: {expected}\n    found: {found}", path.display())
-    });
     let shown = |paths: &[PathBuf]| -> Vec<String> { paths.iter().map(|path| path.display().to_string()).collect() };
+    let file = |table: &TableSurvey, part: u64| folder.part(&table.name, part).display().to_string();
+    let damaged = tables()
+        .flat_map(|table| table.damaged.iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))));
+    let foreign = tables().flat_map(|table| {
+        table.foreign.iter().map(move |(part, [what, expected, found])| {
+            let file = file(table, *part);
+            format!("{file}: belongs to another {what}\n    expected: {expected}\n    found: {found}")
+        })
+    });
     let lists: [(&str, Vec<String>); 5] = [
         ("missing parts:", missing.collect()),
         ("damaged parts (the next run recomputes them):", damaged.collect()),
@@ -143,7 +144,7 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
     let plan = sweep.as_ref().map(Plan::new);
     let is_same = plan.as_ref().is_some_and(|plan| plan.tables == manifest.tables);
     let (Some(sweep), Some(plan), true) = (sweep, plan, is_same) else {
-        let out = quoted(path.parent().filter(|out| !out.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+        let out = quoted(parent(path));
         let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
         text.push_str("SPEC is the spec file of this dataset: it refers to files that are not in the dataset\n");
         return text;

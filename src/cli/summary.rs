@@ -50,8 +50,8 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
         CheckDepth::Footer => "reading the footers",
         CheckDepth::Whole => "checking existing parts",
     };
-    let wait = Wait { done: Some((&looked, there, "part")), ..Wait::new(doing) };
-    waiting(&wait, || Survey::new(folder, manifest, look, &looked))
+    let wait = Wait { done: Some((&looked, there, "part")), ..doing.into() };
+    waiting(wait, || Survey::new(folder, manifest, look, &looked))
 }
 
 /// The contents of a dataset without damaged parts.
@@ -81,11 +81,7 @@ pub enum SummaryBlock {
 pub fn statistics(name: &str, rows: u64, statistics: &TableStatistics) -> String {
     let lines = blocks(name, rows, statistics).into_iter().map(|piece| match piece {
         SummaryBlock::Line(indent, line) => format!("{:indent$}{line}\n", ""),
-        SummaryBlock::Table(indent, names, units, rows) => {
-            let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
-            let lines: Vec<Vec<String>> = [names].into_iter().chain(units).chain(rows).collect();
-            words::aligned(&lines, indent)
-        }
+        SummaryBlock::Table(indent, names, units, rows) => words::aligned(&words::headed(names, units, rows), indent),
     });
     lines.collect()
 }

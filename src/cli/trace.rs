@@ -1,7 +1,7 @@
 //! `slipsweep trace PROTOCOL` and `slipsweep trace DATASET TABLE --row N`: one protocol over time, as a table, CSV or
 //! Parquet.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
@@ -11,7 +11,8 @@ use super::output::{self, Output};
 use super::{
     EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, whole, words, write_file, wrong,
 };
-use crate::dataset::{Cell, Folder, Manifest, ManifestTable, Row, frame};
+use crate::dataset::frame::{self, Cells};
+use crate::dataset::{Cell, Folder, Manifest, ManifestTable, Row};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Friction, StateLaw, Units};
 use crate::names::hint;
@@ -54,13 +55,13 @@ pub struct Arguments {
     #[arg(long = "where", value_name = "CONDITION", requires = "table")]
     conditions: Vec<String>,
     /// Duration, in l/v_0; for a row of `step_response` the shown duration, in the units of the dataset
-    #[arg(long, value_name = "T", value_parser = |text: &str| legal(text, Quantity::Time.domain()))]
+    #[arg(long, value_name = "T", value_parser = number(Quantity::Time))]
     t_f: Option<f64>,
     /// Direct effect: coefficient of ln v in friction, in mu_0
-    #[arg(long, value_name = "A", value_parser = |text: &str| legal(text, Quantity::A.domain()))]
+    #[arg(long, value_name = "A", value_parser = number(Quantity::A))]
     a: Option<f64>,
     /// Evolution effect: coefficient of ln theta in friction, in mu_0
-    #[arg(long, value_name = "B", value_parser = |text: &str| legal(text, Quantity::B.domain()))]
+    #[arg(long, value_name = "B", value_parser = number(Quantity::B))]
     b: Option<f64>,
     /// Evolution law of the state: ageing, slip or prz; ageing by default (optimal and best_cubic with --v-ceiling, gap, step_response)
     #[arg(long, value_name = "LAW", value_parser = law)]
@@ -69,16 +70,16 @@ pub struct Arguments {
     #[arg(long, value_name = "FORM", value_parser = form)]
     friction: Option<Friction>,
     /// Velocity before the protocol, in v_0
-    #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::InitialVelocity))]
+    #[arg(long, value_name = "V", value_parser = number(Quantity::InitialVelocity))]
     v_i: Option<f64>,
     /// Velocity after the protocol, in v_0
-    #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::FinalVelocity))]
+    #[arg(long, value_name = "V", value_parser = number(Quantity::FinalVelocity))]
     v_f: Option<f64>,
     /// Velocity ceiling, in v_0 (optimal; for best_cubic that of the optimum)
-    #[arg(long, value_name = "V", value_parser = |text: &str| velocity(text, Quantity::VelocityCeiling))]
+    #[arg(long, value_name = "V", value_parser = number(Quantity::VelocityCeiling))]
     v_ceiling: Option<f64>,
     /// Friction ceiling, in mu_0 sigma (optimal, bounded_friction)
-    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::FrictionCeiling.domain()))]
+    #[arg(long, value_name = "M", value_parser = number(Quantity::FrictionCeiling))]
     tau_ceiling: Option<f64>,
     /// State and time left from which the protocol starts, as theta=0.3,t_left=0.015, instead of --v-i and --t-f (optimal)
     #[arg(long, value_name = "STATE", value_parser = state, conflicts_with_all = ["v_i", "t_f", "table"])]
@@ -96,19 +97,19 @@ pub struct Arguments {
     )]
     feedback: Loop,
     /// Coefficient of t in theta, in units of 1/t_f as in the table `best_cubic` (gap)
-    #[arg(long, value_name = "X", value_parser = |text: &str| legal(text, Quantity::Alpha2.domain()))]
+    #[arg(long, value_name = "X", value_parser = number(Quantity::Alpha2))]
     alpha_2: Option<f64>,
     /// Coefficient of t^2 in theta, in units of 1/t_f^2 (gap)
-    #[arg(long, value_name = "Y", value_parser = |text: &str| legal(text, Quantity::Alpha3.domain()))]
+    #[arg(long, value_name = "Y", value_parser = number(Quantity::Alpha3))]
     alpha_3: Option<f64>,
     /// Stiffness of the spring, in mu_0 sigma/l; rigid by default (step_response, compliant, regularised)
-    #[arg(long, value_name = "K", value_parser = |text: &str| legal(text, Quantity::Stiffness.domain()))]
+    #[arg(long, value_name = "K", value_parser = number(Quantity::Stiffness))]
     k: Option<f64>,
     /// Mass of the block, in mu_0 sigma l/v_0^2; 0 by default (step_response, compliant, regularised)
-    #[arg(long, value_name = "M", value_parser = |text: &str| legal(text, Quantity::Mass.domain()))]
+    #[arg(long, value_name = "M", value_parser = number(Quantity::Mass))]
     m: Option<f64>,
     /// Length of the smooth pieces, in l/v_0 (regularised)
-    #[arg(long, value_name = "D", value_parser = |text: &str| legal(text, Quantity::Smoothing.domain()))]
+    #[arg(long, value_name = "D", value_parser = number(Quantity::Smoothing))]
     delta_t: Option<f64>,
     /// Without the velocity floor v >= 1 (optimal, best_cubic, regularised)
     #[arg(long)]
@@ -245,11 +246,16 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     }
 }
 
-/// Parses a velocity in units of `v_0`. One below 1 is probably in m/s.
-fn velocity(text: &str, quantity: Quantity) -> Result<f64, String> {
-    let is_small = text.parse().is_ok_and(|value: f64| value > 0.0 && value < 1.0);
-    let help = if is_small { "\n  help: velocities are in units of v_0; divide m/s by v_0" } else { "" };
-    legal(text, quantity.domain()).map_err(|error| format!("{error}{help}"))
+/// A parser of a quantity. A velocity below 1 is probably in m/s.
+fn number(quantity: Quantity) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let is_small = text.parse().is_ok_and(|value: f64| value > 0.0 && value < 1.0);
+        let help = match quantity.unit(Scale::Model) {
+            "v_0" if is_small => "\n  help: velocities are in units of v_0; divide m/s by v_0",
+            _ => "",
+        };
+        legal(text, quantity.domain()).map_err(|error| format!("{error}{help}"))
+    }
 }
 
 /// The protocol to trace, from flags or from a row.
@@ -456,7 +462,7 @@ impl Arguments {
         let effects = Effects {
             disturbance,
             t: found.t,
-            shown: self.feedback,
+            shown: if self.feedback == Loop::Open { "open" } else { "closed" },
             open: (found.open.work - found.planned.work, found.open.terminal_error),
             closed: (found.closed.work - found.planned.work, found.closed.terminal_error),
         };
@@ -474,23 +480,16 @@ impl Arguments {
         self.check_law(name)?;
         let mut heeded = trace::quantities(if self.from.is_some() { "feedback" } else { name });
         heeded.retain(|quantity| self.is_ageing() || *quantity != Quantity::FrictionCeiling);
-        let flags = |is_listed: &dyn Fn(Quantity, bool) -> bool| -> Vec<String> {
-            let all = self.given().into_iter();
-            all.filter(|(quantity, given)| is_listed(*quantity, given.is_some()))
-                .map(|(quantity, _)| flag(quantity))
-                .collect()
-        };
-        let missing =
-            flags(&|quantity, is_given| !is_given && heeded.contains(&quantity) && quantity.default().is_empty());
-        let unused = flags(&|quantity, is_given| is_given && !heeded.contains(&quantity));
+        let (given, missing): (Vec<_>, Vec<_>) = self.given().into_iter().partition(|(_, given)| given.is_some());
+        let is_needed = |quantity: &Quantity| heeded.contains(quantity) && quantity.default().is_empty();
+        let missing: Vec<Quantity> = missing.into_iter().map(|(quantity, _)| quantity).filter(is_needed).collect();
         if !missing.is_empty() {
-            return Err(wrong(format!("`{name}` needs {}", missing.join(", "))));
+            let flags: Vec<String> = missing.into_iter().map(flag).collect();
+            return Err(wrong(format!("`{name}` needs {}", flags.join(", "))));
         }
-        let unused = unused.into_iter().chain(
-            (self.unbounded && !trace::has_floor(name, self.friction.unwrap_or_default()))
-                .then(|| "--unbounded".to_owned()),
-        );
-        match unused.into_iter().next() {
+        let unused = given.into_iter().find(|(quantity, _)| !heeded.contains(quantity));
+        let is_unbounded = self.unbounded && !trace::has_floor(name, self.friction.unwrap_or_default());
+        match unused.map(|(quantity, _)| flag(quantity)).or(is_unbounded.then(|| "--unbounded".to_owned())) {
             Some(flag) => Err(wrong(format!("`{name}` takes no {flag}"))),
             None => Ok(()),
         }
@@ -541,21 +540,15 @@ impl Arguments {
     }
 
     /// The number of the row of a table.
-    fn row_number(
-        &self,
-        path: &Path,
-        folder: &Folder,
-        manifest: &Manifest,
-        table: &ManifestTable,
-    ) -> Result<u64, Failure> {
+    fn row_number(&self, source: &RowSource<'_>) -> Result<u64, Failure> {
         match self.row {
             Some(row) => Ok(row),
             None if self.conditions.is_empty() => {
-                let last = table.rows.saturating_sub(1);
-                let expected = format!("--row N, from 0 to {last}, or --where CONDITION");
+                let RowSource { path, table, .. } = source;
+                let expected = format!("--row N, from 0 to {}, or --where CONDITION", table.rows.saturating_sub(1));
                 Err(refused(format!("{}: which row of `{}`?", path.display(), table.name), expected, "add --row 0"))
             }
-            None => the_row(path, folder, (manifest, table), &self.conditions),
+            None => source.only_row(&self.conditions),
         }
     }
 
@@ -577,15 +570,16 @@ impl Arguments {
             return Err(refused(format!("{name}: a dataset after its table"), "the dataset, then the table", help));
         }
         let (folder, manifest) = dataset(path)?;
-        let Some(listed) = manifest.tables.iter().find(|table| table.name == name) else {
+        let Some(table) = manifest.tables.iter().find(|table| table.name == name) else {
             let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();
             return Err(no_table(&format!("{}: ", path.display()), name, &names));
         };
         if !trace::TABLES.contains(&name) {
             return Err(wrong(Pathless::Table(name.to_owned())));
         }
-        let number = self.row_number(path, &folder, &manifest, listed)?;
-        let (part, written) = row_at(path, &folder, &manifest, listed, number)?;
+        let source = RowSource { path, folder: &folder, manifest: &manifest, table };
+        let number = self.row_number(&source)?;
+        let (part, written) = source.row(number)?;
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
         let friction = friction(&spec.model)?;
@@ -638,130 +632,126 @@ fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
     row.iter().filter_map(axis).collect()
 }
 
-/// Reads a row of a table from its part.
-fn row_at(
-    path: &Path,
-    folder: &Folder,
-    manifest: &Manifest,
-    table: &ManifestTable,
-    row: u64,
-) -> Result<(std::path::PathBuf, Row), Failure> {
-    if row >= table.rows {
-        let (path, last) = (path.display(), table.rows.saturating_sub(1));
-        return Err(wrong(format!("{path}: no row {row} in `{}`\n  expected: a row from 0 to {last}", table.name)));
-    }
-    let part = row / table.rows_per_part.max(1);
-    let verified = folder.verified_part(manifest, table, part).map_err(Failure::failed)?;
-    let file = verified.ok_or_else(|| {
-        let (file, help) = (folder.part(&table.name, part), "run the sweep again; it computes only missing parts");
-        wrong(format!("{}: row {row} is in a part that is missing\n  help: {help}", file.display()))
-    })?;
-    let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
-    let row = frame::row(&file, place).map_err(Failure::failed)?;
-    Ok((file, row))
-}
-
 /// Greatest number of rows that a message names. Chosen: they fit on a line.
 const MAX_NAMED_ROWS: usize = 5;
 
-/// The only row of a table that meets all conditions. Reads only the columns of the conditions.
-fn the_row(
-    path: &Path,
-    folder: &Folder,
-    (manifest, table): (&Manifest, &ManifestTable),
-    conditions: &[String],
-) -> Result<u64, Failure> {
-    let mut all = Vec::new();
-    for text in conditions {
-        all.extend(Condition::all(text)?);
+/// A table of the dataset in `path`.
+struct RowSource<'a> {
+    path: &'a Path,
+    folder: &'a Folder,
+    manifest: &'a Manifest,
+    table: &'a ManifestTable,
+}
+
+impl RowSource<'_> {
+    /// Reads a row from its part.
+    fn row(&self, row: u64) -> Result<(PathBuf, Row), Failure> {
+        let RowSource { path, folder, manifest, table } = self;
+        if row >= table.rows {
+            let (path, last) = (path.display(), table.rows.saturating_sub(1));
+            return Err(wrong(format!("{path}: no row {row} in `{}`\n  expected: a row from 0 to {last}", table.name)));
+        }
+        let part = row / table.rows_per_part.max(1);
+        let verified = folder.verified_part(manifest, table, part).map_err(Failure::failed)?;
+        let file = verified.ok_or_else(|| {
+            let (file, help) = (folder.part(&table.name, part), "run the sweep again; it computes only missing parts");
+            wrong(format!("{}: row {row} is in a part that is missing\n  help: {help}", file.display()))
+        })?;
+        let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
+        let row = frame::row(&file, place).map_err(Failure::failed)?;
+        Ok((file, row))
     }
-    let names: Vec<&str> = all.iter().map(|condition| condition.column.as_str()).collect();
-    let mut found = Vec::new();
-    for part in folder.parts_there(table) {
-        let file = folder.part(&table.name, part);
-        if part == 0 || found.is_empty() {
-            let headings = frame::headings(&file).map_err(Failure::failed)?.0;
-            let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
-            if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-                let found = format!("--where: `{}` has no column `{unknown}`", table.name);
-                return Err(refused(found, known.join(", "), hint(unknown, known.iter().copied())));
+
+    /// The numbers of the first rows of the present parts, and their files.
+    fn files(&self) -> impl Iterator<Item = (u64, PathBuf)> {
+        let there = self.folder.parts_there(self.table).into_iter();
+        there.map(|part| (self.table.rows_of(part).start, self.folder.part(&self.table.name, part)))
+    }
+
+    /// The only row that meets all conditions.
+    fn only_row(&self, conditions: &[String]) -> Result<u64, Failure> {
+        let all = conditions.iter().map(|text| Condition::all(text)).collect::<Result<Vec<_>, _>>()?.concat();
+        let found = self.rows(&all)?;
+        let (at, name, conditions) = (self.path.display(), &self.table.name, conditions.join(", "));
+        match found.as_slice() {
+            [row] => Ok(*row),
+            [] => {
+                let nearest = self.nearest(&all)?;
+                let found = format!("{at}: no row of `{name}` meets --where {conditions:?}{nearest}");
+                Err(wrong(format!("{found}\n  help: slipsweep head {at} {name}")))
+            }
+            several => {
+                let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
+                let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
+                let what = format!("{at}: several rows of `{name}` meet --where {conditions:?}");
+                let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
+                let axes = self.differing_axes(several)?.join(", ");
+                let more = if axes.is_empty() { String::new() } else { format!(", or a condition on {axes}") };
+                Err(refused(found, "one row", format!("--row {}{more}", several[0])))
             }
         }
-        let frame = frame::read(&file, &names).map_err(Failure::failed)?;
-        let first = table.rows_of(part).start;
-        let meets = |place: &usize| {
-            frame.row(*place).iter().zip(&all).all(|((_, cell), condition)| match cell {
-                Cell::Number(number) => condition.holds(*number),
-                Cell::Word(word) => condition.holds_word(Some(word)),
-                Cell::Missing => false,
-            })
-        };
-        found.extend((0..frame.height).filter(meets).take(MAX_NAMED_ROWS + 1).map(|place| first + place as u64));
-        if found.len() > MAX_NAMED_ROWS {
-            break;
-        }
     }
-    let (at, name, conditions) = (path.display(), &table.name, conditions.join(", "));
-    match found.as_slice() {
-        [row] => Ok(*row),
-        [] => {
-            let nearest = nearest(folder, table, &all)?;
-            let found = format!("{at}: no row of `{name}` meets --where {conditions:?}{nearest}");
-            Err(wrong(format!("{found}\n  help: slipsweep head {at} {name}")))
-        }
-        several => {
-            let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
-            let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
-            let what = format!("{at}: several rows of `{name}` meet --where {conditions:?}");
-            let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
-            let axes = differing_axes(path, folder, (manifest, table), several)?;
-            let more = if axes.is_empty() { String::new() } else { format!(", or a condition on {}", axes.join(", ")) };
-            Err(refused(found, "one row", format!("--row {}{more}", several[0])))
-        }
-    }
-}
 
-/// The values of the table that are nearest to the wanted numbers that it does not have, as a line of a message.
-fn nearest(folder: &Folder, table: &ManifestTable, conditions: &[Condition]) -> Result<String, Failure> {
-    let mut missed = Vec::new();
-    for condition in conditions {
-        let Some(wanted) = condition.wanted() else { continue };
-        let mut best: Option<f64> = None;
-        for part in folder.parts_there(table) {
-            let frame = frame::read(&folder.part(&table.name, part), &[&condition.column]).map_err(Failure::failed)?;
-            let numbers = (0..frame.height).filter_map(|row| match frame.row(row).first() {
-                Some((_, Cell::Number(value))) => Some(*value),
-                _ => None,
-            });
-            let off = |value: &f64| if condition.holds(*value) { 0.0 } else { (value - wanted).abs() };
-            best = numbers.chain(best).min_by(|one, other| off(one).total_cmp(&off(other)));
+    /// The first rows that meet all conditions, more than [`MAX_NAMED_ROWS`] if there are more. Reads only the columns of the conditions.
+    fn rows(&self, conditions: &[Condition]) -> Result<Vec<u64>, Failure> {
+        let names: Vec<&str> = conditions.iter().map(|condition| condition.column.as_str()).collect();
+        let mut found = Vec::new();
+        for (first, file) in self.files() {
+            if found.is_empty() {
+                let headings = frame::headings(&file).map_err(Failure::failed)?.0;
+                let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
+                if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
+                    let found = format!("--where: `{}` has no column `{unknown}`", self.table.name);
+                    return Err(refused(found, known.join(", "), hint(unknown, known.iter().copied())));
+                }
+            }
+            let frame = frame::read(&file, &names).map_err(Failure::failed)?;
+            let meets = |row: &usize| {
+                frame.columns.iter().zip(conditions).all(|((_, cells), condition)| condition.holds_in(cells, *row))
+            };
+            found.extend((0..frame.height).filter(meets).take(MAX_NAMED_ROWS + 1).map(|row| first + row as u64));
+            if found.len() > MAX_NAMED_ROWS {
+                break;
+            }
         }
-        if let Some(best) = best.filter(|best| !condition.holds(*best)) {
-            missed.push(format!("{} = {best:?}", condition.column));
-        }
+        Ok(found)
     }
-    Ok(if missed.is_empty() { String::new() } else { format!("\n  found: nearest {}", missed.join(", ")) })
-}
 
-/// The axes in which rows differ.
-fn differing_axes(
-    path: &Path,
-    folder: &Folder,
-    (manifest, table): (&Manifest, &ManifestTable),
-    numbers: &[u64],
-) -> Result<Vec<String>, Failure> {
-    let rows = numbers.iter().map(|row| Ok(row_at(path, folder, manifest, table, *row)?.1));
-    let rows: Vec<Row> = rows.collect::<Result<_, Failure>>()?;
-    let varies = |place: usize| rows.iter().any(|row| row.get(place) != rows[0].get(place));
-    let names = rows[0].iter().enumerate().filter(|(place, _)| varies(*place)).map(|(_, (name, _))| name);
-    Ok(names.filter(|name| Quantity::from_name(name).is_some()).cloned().collect())
+    /// The values that are nearest to the wanted numbers that the table does not have, as a line of a message.
+    fn nearest(&self, conditions: &[Condition]) -> Result<String, Failure> {
+        let mut missed = Vec::new();
+        for condition in conditions {
+            let Some(wanted) = condition.wanted() else { continue };
+            let mut best: Option<f64> = None;
+            for (_, file) in self.files() {
+                let frame = frame::read(&file, &[&condition.column]).map_err(Failure::failed)?;
+                let Some((_, Cells::Numbers(numbers))) = frame.columns.into_iter().next() else { continue };
+                let off = |value: &f64| if condition.holds(*value) { 0.0 } else { (value - wanted).abs() };
+                let numbers = numbers.into_iter().filter(|value| !value.is_nan());
+                best = numbers.chain(best).min_by(|one, other| off(one).total_cmp(&off(other)));
+            }
+            if let Some(best) = best.filter(|best| !condition.holds(*best)) {
+                missed.push(format!("{} = {best:?}", condition.column));
+            }
+        }
+        Ok(if missed.is_empty() { String::new() } else { format!("\n  found: nearest {}", missed.join(", ")) })
+    }
+
+    /// The axes in which rows differ.
+    fn differing_axes(&self, numbers: &[u64]) -> Result<Vec<String>, Failure> {
+        let rows: Vec<Row> = numbers.iter().map(|row| Ok(self.row(*row)?.1)).collect::<Result<_, Failure>>()?;
+        let varies = |place: usize| rows.iter().any(|row| row.get(place) != rows[0].get(place));
+        let names = rows[0].iter().enumerate().filter(|(place, _)| varies(*place)).map(|(_, (name, _))| name);
+        Ok(names.filter(|name| Quantity::from_name(name).is_some()).cloned().collect())
+    }
 }
 
 /// What a disturbance does to a protocol: the work beyond the planned one and the terminal error, by loop.
 struct Effects {
     disturbance: Disturbance,
     t: f64,
-    shown: Loop,
+    /// The name of the loop that is shown.
+    shown: &'static str,
     open: (f64, f64),
     closed: (f64, f64),
 }
@@ -773,21 +763,20 @@ impl Effects {
         let line = |name: &str, (extra, error): (f64, f64)| {
             format!("    {name}: work {:+.6}, terminal_error {}\n", extra, words::number(error))
         };
-        let shown = if self.shown == Loop::Open { "open" } else { "closed" };
         format!(
-            "  disturbed: theta {sign}{change} % at t = {}; extra work, and relative miss of the target theta\n{}{}  shown: {shown} loop\n",
+            "  disturbed: theta {sign}{change} % at t = {}; extra work, and relative miss of the target theta\n{}{}  shown: {} loop\n",
             words::number(self.t),
             line("open loop, v(t) as planned", self.open),
             line("closed loop, v(theta, t_left)", self.closed),
+            self.shown,
         )
     }
 
     fn facts(&self) -> Vec<(String, String)> {
-        let shown = if self.shown == Loop::Open { "open" } else { "closed" };
         [
             ("disturbed_theta", format!("{:?}", self.disturbance.change)),
             ("disturbed_at", format!("{:?}", self.t)),
-            ("loop", shown.to_owned()),
+            ("loop", self.shown.to_owned()),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .to_vec()
@@ -882,12 +871,8 @@ fn status(status: Status) -> String {
 /// The aligned columns with their units. Times that nine digits do not distinguish have all digits.
 fn table(trace: &Trace, units: &Units) -> String {
     let nine: Vec<String> = trace.moments.iter().map(|moment| words::number(moment.t)).collect();
-    let pairs = trace.moments.windows(2).zip(nine.windows(2));
-    let alike = |(moments, shown): (&[_], &[String])| {
-        let moments: &[crate::protocol::Moment] = moments;
-        shown[0] == shown[1] && moments[0].t < moments[1].t
-    };
-    let all_digits = pairs.into_iter().any(alike);
+    let mut pairs = trace.moments.windows(2).zip(nine.windows(2));
+    let all_digits = pairs.any(|(moments, shown)| shown[0] == shown[1] && moments[0].t < moments[1].t);
     let columns = trace.columns();
     let mut lines = vec![columns.iter().map(|&column| COLUMNS[column].name.to_owned()).collect::<Vec<_>>()];
     lines.push(columns.iter().map(|&column| units.name(trace::unit(column)).to_owned()).collect());

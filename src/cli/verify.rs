@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::watch::{Wait, waiting};
+use super::watch::waiting;
 use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, whole, words};
 use crate::dataset::Cell;
 use crate::verify::{Audit, MAX_DIFFERENCE_RTOLS, verify as audit};
@@ -30,9 +30,8 @@ pub struct Arguments {
 pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
     let (_, manifest) = dataset(path)?;
-    let again = Wait::new("solving the sample again");
-    let audits =
-        waiting(&again, || audit(path, &manifest, arguments.sample, arguments.seed)).map_err(Failure::failed)?;
+    let again = || audit(path, &manifest, arguments.sample, arguments.seed);
+    let audits = waiting("solving the sample again", again).map_err(Failure::failed)?;
     let text: Vec<String> = audits.iter().map(summary).collect();
     say(&text.join("\n"))?;
     let errors: usize = audits.iter().map(Audit::errors).sum();

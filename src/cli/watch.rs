@@ -49,17 +49,17 @@ pub struct Wait<'a> {
     pub quiet: bool,
 }
 
-impl<'a> Wait<'a> {
-    /// A wait without a known progress.
-    pub fn new(doing: &'a str) -> Wait<'a> {
+/// A phase without a known progress.
+impl<'a> From<&'a str> for Wait<'a> {
+    fn from(doing: &'a str) -> Wait<'a> {
         Wait { doing, done: None, quiet: false }
     }
 }
 
 /// Runs `work`, and shows its phase on a terminal after a second. Ctrl-C and SIGTERM end the process with a message that nothing has changed.
 /// Waits must not be nested.
-pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
-    let start = Instant::now();
+pub fn waiting<'a, T>(wait: impl Into<Wait<'a>>, work: impl FnOnce() -> T) -> T {
+    let (wait, start) = (wait.into(), Instant::now());
     let mut line: Option<ProgressBar> = None;
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
@@ -69,7 +69,7 @@ pub fn waiting<T>(wait: &Wait<'_>, work: impl FnOnce() -> T) -> T {
             process::exit(128 + number);
         }
         if !wait.quiet && start.elapsed() > PROGRESS_DELAY && stderr().is_terminal() {
-            line.get_or_insert_with(|| text_line(0)).set_message(match wait.done {
+            line.get_or_insert_with(text_line).set_message(match wait.done {
                 Some((done, all, thing)) => {
                     let (done, all) = (words::count(done.load(Ordering::Relaxed)), words::things(all, thing));
                     format!("{}: {done} of {all}", wait.doing)
@@ -155,13 +155,14 @@ fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
     Ok(())
 }
 
-/// A progress line on a terminal: a message, after a bar if `rows` is not 0.
-fn text_line(rows: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr_with_hz(10));
-    set_style(&bar, rows > 0);
+/// A progress line on a terminal: a message.
+fn text_line() -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(10));
+    set_style(&bar, false);
     bar
 }
 
+/// Shows a message, after a bar if `has_bar`.
 fn set_style(bar: &ProgressBar, has_bar: bool) {
     let template = if has_bar { "{bar:20} {percent}% of {human_len} rows, {msg}" } else { "{msg}" };
     if let Ok(style) = ProgressStyle::with_template(template) {
@@ -185,7 +186,7 @@ struct ProgressDisplay {
 
 impl ProgressDisplay {
     fn new(rows: u64, quiet: bool) -> ProgressDisplay {
-        let bar = (!quiet && stderr().is_terminal()).then(|| text_line(0));
+        let bar = (!quiet && stderr().is_terminal()).then(text_line);
         let now = Instant::now();
         ProgressDisplay { rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
     }

@@ -1,5 +1,7 @@
 //! Numbers, amounts and tables as text.
 
+use std::iter;
+
 use indicatif::HumanCount;
 
 use crate::protocol::Status;
@@ -92,6 +94,12 @@ pub fn ranges(numbers: impl IntoIterator<Item = u64>) -> String {
 /// The numbers from `first` to `last`.
 pub fn range(first: u64, last: u64) -> String {
     if first == last { first.to_string() } else { format!("{first}-{last}") }
+}
+
+/// Rows under their names and, if any is known, their units.
+pub fn headed(names: Vec<String>, units: Vec<String>, rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let units = Some(units).filter(|units| units.iter().any(|unit| !unit.is_empty()));
+    iter::once(names).chain(units).chain(rows).collect()
 }
 
 /// Lines with aligned columns, two spaces apart, each after `indent` spaces.

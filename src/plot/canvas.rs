@@ -11,10 +11,10 @@ pub const MILLIMETRE: f64 = 72.0 / 25.4;
 const HATCH_STEP: f64 = 3.2;
 
 /// A line style.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
     /// Colour.
-    pub colour: String,
+    pub colour: &'static str,
     /// Width, in points.
     pub width: f64,
     /// Lengths of dashes and spaces, in points; empty for a solid line.
@@ -23,8 +23,8 @@ pub struct Stroke {
 
 impl Stroke {
     /// A solid line.
-    pub fn solid(colour: &str, width: f64) -> Stroke {
-        Stroke { colour: colour.to_owned(), width, dashes: &[] }
+    pub fn solid(colour: &'static str, width: f64) -> Stroke {
+        Stroke { colour, width, dashes: &[] }
     }
 }
 
@@ -61,7 +61,7 @@ impl Area {
 
 /// A text style.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Text<'a> {
+pub struct Text {
     /// Height of the letters, in points.
     pub size: f64,
     /// The anchor of the words.
@@ -69,7 +69,7 @@ pub struct Text<'a> {
     /// Whether the text is rotated by a quarter turn to the left.
     pub upwards: bool,
     /// Colour.
-    pub colour: &'a str,
+    pub colour: &'static str,
 }
 
 /// The canvas.
@@ -82,8 +82,10 @@ pub struct Canvas {
 /// A coordinate, to a hundredth of a point.
 fn at(value: f64) -> String {
     let text = format!("{:.2}", if value.is_finite() { value.clamp(-1e5, 1e5) } else { 0.0 });
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    match label::trimmed(&text) {
+        "-0" => "0".to_owned(),
+        text => text.to_owned(),
+    }
 }
 
 /// The SVG path through points.
@@ -190,7 +192,7 @@ impl Canvas {
     }
 
     /// A text in markup with its baseline through `place`.
-    pub fn text(&mut self, place: (f64, f64), markup: &str, style: &Text<'_>) {
+    pub fn text(&mut self, place: (f64, f64), markup: &str, style: &Text) {
         let Text { size, anchor, upwards, colour } = *style;
         // Anchors are computed from the metrics of the font, since viewers differ in how they anchor spans of several styles.
         let width = size * label::width(markup);

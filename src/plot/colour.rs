@@ -42,7 +42,7 @@ pub const MAX_SERIES: usize = SERIES.len();
 
 /// The line of series number `place`.
 pub fn series(place: usize) -> Stroke {
-    Stroke { colour: SERIES[place % SERIES.len()].to_owned(), width: 1.1, dashes: DASHES[place % DASHES.len()] }
+    Stroke { colour: SERIES[place % SERIES.len()], width: 1.1, dashes: DASHES[place % DASHES.len()] }
 }
 
 /// Fills of classes. Chosen: as many as strategies of an optimum, none of the same grey as its neighbours.

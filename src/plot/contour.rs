@@ -2,40 +2,25 @@
 
 use std::collections::BTreeMap;
 
-/// A field over a grid of `columns` by `rows`, row by row; NaN for a missing value.
-#[derive(Debug, Clone, Copy)]
-pub struct Field<'a> {
-    /// Values of a row.
-    pub columns: usize,
-    /// Rows.
-    pub rows: usize,
-    /// The values.
-    pub values: &'a [f64],
-}
-
 /// An edge of the grid: its first corner, and whether it leads to the next row.
 type Edge = (usize, bool);
 
 /// The edges to which line segments lead from each edge.
 type Segments = BTreeMap<Edge, Vec<Edge>>;
 
-/// The lines `field = level`, in units of columns and rows. Cells with a missing corner have no lines.
-pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
-    let Field { columns, rows, values } = field;
-    if columns < 2 || rows < 2 || values.len() < columns * rows {
-        return Vec::new();
-    }
+/// The lines where a field is 0, in units of columns and rows. The field has at least two rows of `columns` values; NaN stands for a missing value.
+/// Cells with a missing corner have no lines.
+pub fn contour(values: &[f64], columns: usize) -> Vec<Vec<(f64, f64)>> {
     let mut pieces = Segments::new();
-    for corner in (0..(rows - 1) * columns).filter(|corner| corner % columns < columns - 1) {
-        for (from, to) in crossings(corner, columns, |corner| values[corner] - level) {
+    for corner in (0..values.len() - columns).filter(|corner| corner % columns < columns - 1) {
+        for (from, to) in crossings(corner, columns, values) {
             pieces.entry(from).or_default().push(to);
             pieces.entry(to).or_default().push(from);
         }
     }
     let place = |(corner, upwards): Edge| {
         let other = if upwards { corner + columns } else { corner + 1 };
-        let (from, to) = (values[corner] - level, values[other] - level);
-        let fraction = from / (from - to);
+        let fraction = values[corner] / (values[corner] - values[other]);
         let (x, y) = ((corner % columns) as f64, (corner / columns) as f64);
         if upwards { (x, y + fraction) } else { (x + fraction, y) }
     };
@@ -43,8 +28,8 @@ pub fn contour(field: Field<'_>, level: f64) -> Vec<Vec<(f64, f64)>> {
 }
 
 /// The line segments through the cell whose first corner is `corner`, from edge to edge.
-fn crossings(corner: usize, columns: usize, height: impl Fn(usize) -> f64) -> Vec<(Edge, Edge)> {
-    let heights = [corner, corner + 1, corner + columns + 1, corner + columns].map(height);
+fn crossings(corner: usize, columns: usize, values: &[f64]) -> Vec<(Edge, Edge)> {
+    let heights = [corner, corner + 1, corner + columns + 1, corner + columns].map(|corner| values[corner]);
     if heights.iter().any(|height| height.is_nan()) {
         return Vec::new();
     }
@@ -97,16 +82,14 @@ mod tests {
 
     #[test]
     fn a_plane_has_one_straight_contour() {
-        let values = field(11, |x, y| x + y);
-        let lines = contour(Field { columns: 11, rows: 11, values: &values }, 7.5);
+        let lines = contour(&field(11, |x, y| x + y - 7.5), 11);
         assert_eq!(lines.len(), 1);
         assert!(lines[0].iter().all(|(x, y)| (x + y - 7.5).abs() < 1e-12));
     }
 
     #[test]
     fn a_hill_has_a_ring() {
-        let values = field(21, |x, y| (x - 10.0).powi(2) + (y - 10.0).powi(2));
-        let lines = contour(Field { columns: 21, rows: 21, values: &values }, 30.0);
+        let lines = contour(&field(21, |x, y| (x - 10.0).powi(2) + (y - 10.0).powi(2) - 30.0), 21);
         assert_eq!(lines.len(), 1);
         assert_eq!(lines[0].first(), lines[0].last());
         assert!(lines[0].iter().all(|(x, y)| ((x - 10.0).hypot(y - 10.0) - 30f64.sqrt()).abs() < 0.05));
@@ -114,8 +97,7 @@ mod tests {
 
     #[test]
     fn a_gap_in_the_data_cuts_the_line() {
-        let values = field(11, |x, y| if x == 5.0 { f64::NAN } else { y });
-        let lines = contour(Field { columns: 11, rows: 11, values: &values }, 4.5);
+        let lines = contour(&field(11, |x, y| if x == 5.0 { f64::NAN } else { y - 4.5 }), 11);
         assert_eq!(lines.len(), 2);
     }
 }

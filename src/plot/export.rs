@@ -31,12 +31,8 @@ const CSS_DPI: f64 = 96.0;
 impl Format {
     /// The format of a file name, by its ending.
     pub fn of(path: &Path) -> Option<Format> {
-        match path.extension()?.to_str()?.to_lowercase().as_str() {
-            "svg" => Some(Format::Svg),
-            "png" => Some(Format::Png),
-            "pdf" => Some(Format::Pdf),
-            _ => None,
-        }
+        let ending = path.extension()?.to_str()?.to_lowercase();
+        [Format::Svg, Format::Png, Format::Pdf].into_iter().find(|format| format.ending() == ending)
     }
 
     /// The file ending.

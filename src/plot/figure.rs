@@ -56,8 +56,8 @@ const KEY_WIDTH: f64 = 20.0;
 pub const MAX_MARKED_POINTS: usize = 50;
 
 /// Text styles of figures and of notes.
-const LABEL: Text<'static> = Text { size: SIZE, anchor: Anchor::Start, upwards: false, colour: "#000" };
-const NOTE: Text<'static> = Text { size: NOTE_SIZE, anchor: Anchor::Start, upwards: false, colour: "#444" };
+const LABEL: Text = Text { size: SIZE, anchor: Anchor::Start, upwards: false, colour: "#000" };
+const NOTE: Text = Text { size: NOTE_SIZE, anchor: Anchor::Start, upwards: false, colour: "#444" };
 
 /// A figure.
 #[derive(Debug, Clone, Default)]
@@ -117,13 +117,24 @@ pub struct Axis {
     pub scale: Scale,
 }
 
+impl Axis {
+    /// The axis of a column with a unit, over the range of `scale`.
+    pub fn new(column: &str, unit: &str, scale: Scale) -> Axis {
+        Axis { column: column.to_owned(), unit: unit.to_owned(), scale }
+    }
+
+    fn label(&self, power: i32) -> String {
+        label::axis(&self.column, &self.unit, power)
+    }
+}
+
 /// A layer between axes. Positions are axis values, unless stated as fractions.
 #[derive(Debug, Clone)]
 pub enum Layer {
     /// The background where a map has no data: hatched.
     Hatch,
-    /// Colours that fill the panel.
-    Map(Map),
+    /// Colours that fill the panel: a PNG image, first row at the top, and the values under the pointer, for HTML pages.
+    Map(Vec<u8>, Hover),
     /// A line through points.
     Line(Vec<(f64, f64)>, Stroke),
     /// Lines that are visible on any colour: dark, with a light rim.
@@ -144,13 +155,11 @@ pub enum Layer {
     Level(f64, Stroke),
 }
 
-/// An image over the panel, with the values of its pixels.
-#[derive(Debug, Clone)]
-pub struct Map {
-    /// The PNG image of the whole panel, first row at the top.
-    pub png: Vec<u8>,
-    /// The values under the pointer, for HTML pages.
-    pub hover: Option<Hover>,
+impl Layer {
+    /// The marks of the points of series number `series`.
+    pub fn marks(points: Vec<(f64, f64)>, series: usize) -> Layer {
+        Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(series))).collect())
+    }
 }
 
 /// The values of a map.
@@ -240,24 +249,11 @@ impl Entry {
 
 /// A figure as SVG, with the positions of its maps.
 #[derive(Debug, Clone)]
-pub struct SvgFigure {
+pub struct SvgFigure<'a> {
     /// The picture.
     pub svg: String,
-    /// Maps with values, and their positions in the picture.
-    pub hovers: Vec<HoverMap>,
-}
-
-/// A map with values in a picture.
-#[derive(Debug, Clone)]
-pub struct HoverMap {
-    /// Its position.
-    pub area: Area,
-    /// Its horizontal axis.
-    pub x: Axis,
-    /// Its vertical axis.
-    pub y: Axis,
-    /// Its values.
-    pub hover: Hover,
+    /// The maps: position in the picture, panel and values.
+    pub maps: Vec<(Area, &'a Panel, &'a Hover)>,
 }
 
 /// The ticks of a panel, and whether its axes are labelled.
@@ -281,7 +277,7 @@ struct Layout {
 
 impl Figure {
     /// Draws the figure, `width` millimetres wide.
-    pub fn draw(&self, width: f64) -> SvgFigure {
+    pub fn draw(&self, width: f64) -> SvgFigure<'_> {
         let width = width * MILLIMETRE;
         let mut canvas = Canvas::default();
         let inner = width - 2.0 * MARGIN;
@@ -293,13 +289,12 @@ impl Figure {
         }
         let as_powers = self.as_powers();
         let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width(as_powers));
-        let rows = if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH };
-        let (mut foot, hovers) = self.draw_panels(&mut canvas, top, inner - bar - rows, as_powers);
+        let (mut foot, maps) = self.draw_panels(&mut canvas, top, inner - bar - self.row_title_width(), as_powers);
         for note in &self.notes {
             foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
         }
         let height = foot + MARGIN;
-        SvgFigure { svg: canvas.svg(width, height, &label::plain(&self.title)), hovers }
+        SvgFigure { svg: canvas.svg(width, height, &label::plain(&self.title)), maps }
     }
 
     /// Draws the legend below `top`; returns its lower edge.
@@ -323,6 +318,11 @@ impl Figure {
             x += wide;
         }
         y + 4.0
+    }
+
+    /// Width of the titles of rows of panels, in points.
+    fn row_title_width(&self) -> f64 {
+        if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH }
     }
 
     /// Whether logarithmic ticks are powers of ten, in all panels alike.
@@ -370,12 +370,18 @@ impl Figure {
     }
 
     /// Draws the panels and the colour bar; returns their lower edge, and the maps.
-    fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64, as_powers: bool) -> (f64, Vec<HoverMap>) {
+    fn draw_panels(
+        &self,
+        canvas: &mut Canvas,
+        top: f64,
+        inner: f64,
+        as_powers: bool,
+    ) -> (f64, Vec<(Area, &Panel, &Hover)>) {
         let layout = self.layout(inner, as_powers);
         let Layout { width, height, .. } = layout;
         let columns = layout.lefts.len();
         let mut y = top;
-        let mut hovers = Vec::new();
+        let mut maps = Vec::new();
         for (row, panels) in self.panels.chunks(columns).enumerate() {
             y += layout.aboves[row];
             let mut x = MARGIN;
@@ -383,11 +389,10 @@ impl Figure {
                 x += layout.lefts[column];
                 let area = Area { x, y, width, height };
                 panel.draw(canvas, area, &layout.ticks[row * columns + column], layout.lefts[column]);
-                for layer in &panel.layers {
-                    if let Layer::Map(Map { hover: Some(hover), .. }) = layer {
-                        hovers.push(HoverMap { area, x: panel.x.clone(), y: panel.y.clone(), hover: hover.clone() });
-                    }
-                }
+                maps.extend(panel.layers.iter().filter_map(|layer| match layer {
+                    Layer::Map(_, hover) => Some((area, panel, hover)),
+                    _ => None,
+                }));
                 x += width + layout.rights[column];
             }
             if let Some(title) = self.rows.get(row) {
@@ -399,17 +404,15 @@ impl Figure {
         if let Some(colours) = &self.colours {
             let first = top + layout.aboves.first().copied().unwrap_or(0.0);
             let tall = y - layout.belows.last().copied().unwrap_or(0.0) - first;
-            let row_title_width = if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH };
-            let area =
-                Area { x: MARGIN + inner + row_title_width + BAR_SPACE, y: first, width: BAR_WIDTH, height: tall };
-            colours.draw(canvas, area, as_powers);
+            let x = MARGIN + inner + self.row_title_width() + BAR_SPACE;
+            colours.draw(canvas, Area { x, y: first, width: BAR_WIDTH, height: tall }, as_powers);
         }
-        (y, hovers)
+        (y, maps)
     }
 }
 
 /// Draws a paragraph below `top`, with lines of at most `width` points and `space` between them; returns its lower edge.
-fn paragraph(canvas: &mut Canvas, markup: &str, style: &Text<'_>, top: f64, (width, space): (f64, f64)) -> f64 {
+fn paragraph(canvas: &mut Canvas, markup: &str, style: &Text, top: f64, (width, space): (f64, f64)) -> f64 {
     let mut y = top;
     for line in wrapped(markup, style.size, width) {
         y += style.size + space;
@@ -548,7 +551,7 @@ impl Panel {
         let pieces = |line: &Vec<(f64, f64)>| pieces(line.iter().map(|point| place(*point)));
         match layer {
             Layer::Hatch => canvas.hatch(area),
-            Layer::Map(map) => canvas.image(area, &map.png),
+            Layer::Map(png, _) => canvas.image(area, png),
             Layer::Line(line, stroke) => canvas.lines(&pieces(line), stroke),
             Layer::Contour(lines, stroke) => {
                 draw_contour(canvas, &lines.iter().flat_map(pieces).collect::<Vec<_>>(), stroke);
@@ -626,17 +629,11 @@ impl Panel {
         let wishes: Vec<(f64, f64)> =
             marks.iter().map(|(line, words, _)| (*line, NOTE_SIZE * label::width(words) + WORD_SPACE)).collect();
         for ((line, words, stroke), place) in marks.iter().zip(apart(&wishes, area.x, area.x + area.width)) {
-            let leader = Stroke::solid(&stroke.colour, stroke.width);
+            let leader = Stroke { dashes: &[], ..**stroke };
             canvas.line((*line, area.y), (place, area.y - LEADER_LENGTH), &leader);
-            let style = Text { anchor: Anchor::Middle, colour: &stroke.colour, ..NOTE };
+            let style = Text { anchor: Anchor::Middle, colour: stroke.colour, ..NOTE };
             canvas.text((place, area.y - LEADER_LENGTH - 2.5), words, &style);
         }
-    }
-}
-
-impl Axis {
-    fn label(&self, power: i32) -> String {
-        label::axis(&self.column, &self.unit, power)
     }
 }
 

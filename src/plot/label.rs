@@ -101,11 +101,6 @@ fn symbol(name: &str) -> Option<String> {
         "v, v_c" => "*v*, *v*_{c}",
         "work" => "*W*",
         "work_optimal" => "*W*∗",
-        "work_at_t_cross" => "*W*∗(*t*_{cross})",
-        "work_at_t_floor" => "*W*∗(*t*_{floor})",
-        "work_at_t_cheapest" => "*W*∗(*t*_{cheapest})",
-        "work_at_t_min" => "*W*∗(*t*_{min})",
-        "work_at_t_turn" => "*W*∗(*t*_{turn})",
         "v_start" => "*v*(0+)",
         "v_end" => "*v*(*t*_{f}−)",
         "friction_max" => "*τ*_{max}",
@@ -114,12 +109,6 @@ fn symbol(name: &str) -> Option<String> {
         "t_free_out" => "*t*_{free out}",
         "costate" => "∂*W*/∂*θ*",
         "gain" => "∂*v*/∂*θ*",
-        "dwork_da" => "∂*W*∗/∂*a*",
-        "dwork_db" => "∂*W*∗/∂*b*",
-        "dwork_dv_i" => "∂*W*∗/∂*v*_{i}",
-        "dwork_dv_f" => "∂*W*∗/∂*v*_{f}",
-        "dwork_dv_ceiling" => "∂*W*∗/∂*v*_{ceiling}",
-        "dwork_dtau_ceiling" => "∂*W*∗/∂*τ*_{ceiling}",
         "k_c_i" => "*k*_{c}(*v*_{i})",
         "k_c_f" => "*k*_{c}(*v*_{f})",
         "stiffness_ratio" => "*k t*_{f}^{2}/*m*",
@@ -127,6 +116,12 @@ fn symbol(name: &str) -> Option<String> {
     };
     if !known.is_empty() {
         return Some(known.to_owned());
+    }
+    if let Some(time) = name.strip_prefix("work_at_") {
+        return symbol(time).map(|time| format!("*W*∗({time})"));
+    }
+    if let Some(quantity) = name.strip_prefix("dwork_d") {
+        return symbol(quantity).map(|quantity| format!("∂*W*∗/∂{quantity}"));
     }
     let (base, below) = name.split_once('_').map_or((name, None), |(base, below)| (base, Some(below)));
     let letter = match base {
@@ -257,7 +252,7 @@ fn digits(values: &[f64]) -> usize {
 const MAX_COMPARED_VALUES: usize = 1000;
 
 /// Removes trailing zeros of the decimals.
-fn trimmed(digits: &str) -> &str {
+pub fn trimmed(digits: &str) -> &str {
     if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
 }
 

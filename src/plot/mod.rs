@@ -18,7 +18,7 @@ pub use canvas::Stroke;
 pub use colour::series;
 pub use error::PlotError;
 pub use export::Format;
-pub use figure::{Axis, Entry, Figure, HoverMap, Key, Layer, Panel, SvgFigure};
+pub use figure::{Axis, Entry, Figure, Key, Layer, Panel, SvgFigure};
 pub use page::Page;
 pub use scale::Scale;
 pub use symbol::Symbol;

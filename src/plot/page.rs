@@ -1,7 +1,7 @@
 //! A self-contained HTML page: sections, pictures whose maps show their values, sortable tables.
 
 use super::canvas::escaped;
-use super::figure::{Axis, Hover, HoverMap, SvgFigure};
+use super::figure::{Axis, Hover, SvgFigure};
 
 const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/script.js");
@@ -53,7 +53,7 @@ impl Page {
     }
 
     /// A picture; pointing at a map in it shows the value there.
-    pub fn picture(&mut self, drawn: &SvgFigure) {
+    pub fn picture(&mut self, drawn: &SvgFigure<'_>) {
         self.pictures += 1;
         let place = self.pictures;
         // The names of clip paths must be unique in the page.
@@ -62,15 +62,15 @@ impl Page {
             .replace("id=\"clip", &format!("id=\"p{place}-clip"))
             .replace("url(#clip", &format!("url(#p{place}-clip"));
         self.body.push_str(&format!("<figure id=\"picture-{place}\">{svg}"));
-        let cells: usize = drawn.hovers.iter().map(|shown| shown.hover.word.len()).sum();
+        let cells: usize = drawn.maps.iter().map(|(.., hover)| hover.word.len()).sum();
         let step = (1..).find(|step| cells / (step * step) <= MAX_CELLS).unwrap_or(1);
-        if !drawn.hovers.is_empty() {
-            let maps = drawn.hovers.iter().map(|HoverMap { area, x, y, hover }| {
+        if !drawn.maps.is_empty() {
+            let maps = drawn.maps.iter().map(|(area, panel, hover)| {
                 let hover = hover.every(step);
                 serde_json::json!({
                     "area": [area.x, area.y, area.width, area.height],
-                    "x": axis(x, &hover.x),
-                    "y": axis(y, &hover.y),
+                    "x": axis(&panel.x, &hover.x),
+                    "y": axis(&panel.y, &hover.y),
                     "column": hover.column,
                     "values": values(&hover),
                     "words": hover.words,

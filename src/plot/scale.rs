@@ -48,10 +48,7 @@ impl Scale {
     /// The scale of `values`: logarithmic if they are positive and span a large ratio. Rounded zeros do not extend it. `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Scale> {
         let finite: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
-        let span = |values: &mut dyn Iterator<Item = f64>| {
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-        };
-        let (low, high) = span(&mut finite.iter().copied());
+        let (low, high) = range(finite.iter().copied());
         if low > high {
             return None;
         }
@@ -60,7 +57,7 @@ impl Scale {
             return Some(linear);
         }
         let zero = rounding(&finite, high);
-        let (least, _) = span(&mut finite.iter().copied().filter(|value| *value > zero));
+        let (least, _) = range(finite.iter().copied().filter(|value| *value > zero));
         let ratio = if low == 0.0 { LOG_RATIO_WITH_ZERO } else { LOG_RATIO };
         Some(if high / least >= ratio { Scale { low: least, high, log: true } } else { linear })
     }
@@ -176,21 +173,21 @@ impl Scale {
     }
 }
 
+/// The least and the greatest value; `(inf, -inf)` without values.
+pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+}
+
 /// The greatest of the values that are rounded zeros; 0 if there are none.
 fn rounding(values: &[f64], high: f64) -> f64 {
     // Decades below the greatest value; doubles have fewer than 640.
     let decade = |value: f64| (high.log10() - value.log10()).floor().clamp(0.0, 639.0) as usize;
     let mut used = [false; 640];
     values.iter().filter(|value| **value > 0.0).for_each(|value| used[decade(*value)] = true);
-    let mut empty = 0;
-    for (place, is_used) in used.into_iter().enumerate() {
-        empty = if is_used { 0 } else { empty + 1 };
-        if empty == EMPTY_DECADES {
-            let zeros = values.iter().copied().filter(|value| *value <= ROUNDING_RTOL * high && decade(*value) > place);
-            return zeros.fold(0.0, f64::max);
-        }
-    }
-    0.0
+    let used: Vec<usize> = (0..used.len()).filter(|&decade| used[decade]).collect();
+    let Some(gap) = used.windows(2).find(|pair| pair[1] - pair[0] > EMPTY_DECADES) else { return 0.0 };
+    let zeros = values.iter().copied().filter(|value| *value <= ROUNDING_RTOL * high && decade(*value) >= gap[1]);
+    zeros.fold(0.0, f64::max)
 }
 
 /// Whether ascending values are better shown on a logarithmic scale: their ratios are equal, or their range is large.

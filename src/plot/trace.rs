@@ -8,13 +8,11 @@ use super::colour::{self, MAX_SERIES};
 use super::error::PlotError;
 use super::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use super::scale::Scale;
-use super::symbol::Symbol;
 use super::{coincide, label};
 use crate::dataset::frame::{self, Cells, Facts};
 use crate::file;
 use crate::grid::{self, Quantity};
 use crate::model::{Scales, Units};
-use crate::table::Kind;
 use crate::trace::{self, COLUMNS, Trace};
 
 /// Greatest number of points of a line; longer lines are thinned. Chosen: four points per dot of a wide picture in print.
@@ -79,14 +77,12 @@ impl TraceFile {
             unit: units.name(trace::unit(place)).to_owned(),
             cells: trace.moments.iter().map(|moment| Trace::value(moment, place).unwrap_or(f64::NAN)).collect(),
         };
-        let facts: Facts = facts.iter().map(|(key, value)| (format!("slipsweep.{key}"), value.clone())).collect();
-        TraceFile::new(trace.columns().into_iter().map(column).collect(), &facts, "trace".to_owned())
+        TraceFile::new(trace.columns().into_iter().map(column).collect(), facts, "trace".to_owned())
     }
 
     /// The trace of these columns and facts, named `stem` if no fact names it.
-    fn new(columns: Vec<Column>, facts: &Facts, stem: String) -> TraceFile {
-        let fact =
-            |name: &str| facts.iter().find(|(key, _)| key == &format!("slipsweep.{name}")).map(|(_, value)| value);
+    fn new(columns: Vec<Column>, facts: &[(String, String)], stem: String) -> TraceFile {
+        let fact = |name: &str| facts.iter().find(|(key, _)| key == name).map(|(_, value)| value);
         let number = |name: &str| Some((name.to_owned(), fact(name)?.parse().ok()?));
         let parameters = Quantity::ALL.into_iter().filter(|quantity| *quantity != Quantity::Sampling);
         let parameters = parameters.filter_map(|quantity| number(quantity.name()));
@@ -99,6 +95,20 @@ impl TraceFile {
         let points = fact("points").and_then(|points| points.parse().ok());
         TraceFile { name, parameters: parameters.collect(), columns, points }
     }
+
+    fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// Its points in a panel: a column over the time.
+    fn points(&self, name: &str) -> Option<Vec<(f64, f64)>> {
+        let (t, values) = (self.column("t")?, self.column(name)?);
+        Some(thinned(t.cells.iter().copied().zip(values.cells.iter().copied()).collect()))
+    }
+
+    fn is_marked(&self) -> bool {
+        self.points.is_some_and(|points| points < MAX_MARKED_POINTS)
+    }
 }
 
 fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
@@ -110,7 +120,8 @@ fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
         Cells::Numbers(cells) => Some(Column { name, unit: heading.unit.clone(), cells }),
         Cells::Words(..) => None,
     };
-    Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts))
+    let fact = |(key, value): (String, String)| Some((key.strip_prefix("slipsweep.")?.to_owned(), value));
+    Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts.into_iter().filter_map(fact).collect()))
 }
 
 /// The columns of a CSV, and its comments `# key = value`. Without a comment on units, the units are scaled.
@@ -121,14 +132,16 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let comments = text.lines().take_while(|line| line.starts_with('#'));
     let facts: Facts = comments
         .filter_map(|line| line.trim_start_matches('#').split_once('='))
-        .map(|(key, value)| (format!("slipsweep.{}", key.trim()), value.trim().to_owned()))
+        .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
         .collect();
-    let units = facts.iter().find(|(key, _)| key == "slipsweep.units").map_or("", |(_, units)| units.as_str());
+    let units = facts.iter().find(|(key, _)| key == "units").map_or("", |(_, units)| units.as_str());
     let units: Vec<&str> = units.split(", ").collect();
     let mut lines = text.lines().enumerate().skip_while(|(_, line)| line.starts_with('#'));
     let names = lines.next().map_or("", |(_, line)| line);
     let column = |(place, name): (usize, &str)| {
-        let unit = units.get(place).copied().filter(|known| !known.is_empty()).unwrap_or(unit(name));
+        let unit = units.get(place).copied().filter(|known| !known.is_empty());
+        let scaled = || COLUMNS.iter().position(|column| column.name == name).map_or("", trace::unit);
+        let unit = unit.unwrap_or_else(scaled);
         Column { name: name.to_owned(), unit: unit.to_owned(), cells: Vec::new() }
     };
     let mut columns: Vec<Column> = names.split(',').map(str::trim).enumerate().map(column).collect();
@@ -155,30 +168,6 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((columns, facts))
 }
 
-/// The scaled unit of a column.
-fn unit(name: &str) -> &'static str {
-    match COLUMNS.iter().find(|column| column.name == name).map(|column| column.kind) {
-        Some(Kind::Number(unit)) => unit,
-        _ => "",
-    }
-}
-
-impl TraceFile {
-    fn column(&self, name: &str) -> Option<&Column> {
-        self.columns.iter().find(|column| column.name == name)
-    }
-
-    /// Its points in a panel: a column over the time.
-    fn points(&self, name: &str) -> Option<Vec<(f64, f64)>> {
-        let (t, values) = (self.column("t")?, self.column(name)?);
-        Some(thinned(t.cells.iter().copied().zip(values.cells.iter().copied()).collect()))
-    }
-
-    fn is_marked(&self) -> bool {
-        self.points.is_some_and(|points| points < MAX_MARKED_POINTS)
-    }
-}
-
 /// A curve of a panel: numbers of its trace and column, and its points.
 struct Curve {
     trace: usize,
@@ -197,14 +186,14 @@ pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
     }
     one_unit(traces)?;
     let time = Scale { log: false, ..Scale::of(cells(traces, "t")).ok_or(PlotError::Nothing)? };
-    let axis = |names: &[&str], scale| Axis { column: names.join(", "), unit: unit_in(traces, names[0]), scale };
+    let axis = |names: &[&str], scale| Axis::new(&names.join(", "), &unit_in(traces, names[0]), scale);
     let mut panels = Vec::new();
     for names in PANEL_COLUMNS {
         let has = |name: &&str| traces.iter().any(|trace| trace.column(name).is_some());
         let names: Vec<&str> = names.iter().copied().filter(has).collect();
         let Some(scale) = Scale::of(names.iter().flat_map(|name| cells(traces, name))) else { continue };
         let (x, y) = (axis(&["t"], time.with_room(0.03)), axis(&names, scale.with_room(0.06)));
-        let bound = Layer::Level(1.0, Stroke { colour: "#888".to_owned(), width: 0.5, dashes: &[1.0, 1.5] });
+        let bound = Layer::Level(1.0, Stroke { colour: "#888", width: 0.5, dashes: &[1.0, 1.5] });
         let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
         let layers = has_bound.then_some(bound).into_iter().collect();
         let of_course = |(trace, of): (usize, &TraceFile)| {
@@ -251,19 +240,15 @@ fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
 
 /// For each trace, the first trace with which it coincides in all panels.
 fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
-    // The curves of a trace in fractions of the panel, each with its column.
-    let curves = |(panel, curves): &(Panel, Vec<Curve>), trace: usize| -> Vec<(usize, Vec<(f64, f64)>)> {
-        let fraction = |(x, y): &(f64, f64)| (panel.x.scale.fraction(*x), panel.y.scale.fraction(*y));
-        let own = curves.iter().filter(|curve| curve.trace == trace);
-        own.map(|curve| (curve.rank, curve.points.iter().map(fraction).collect())).collect()
-    };
     coincide::leaders(count, |one, other| {
-        panels.iter().all(|panel| {
-            let (one, other) = (curves(panel, one), curves(panel, other));
-            let is_same = |((rank, points), (other_rank, other_points)): (&(usize, Vec<_>), &(usize, Vec<_>))| {
-                rank == other_rank && coincide::anywhere(points, other_points)
+        panels.iter().all(|(panel, curves)| {
+            let own = |trace: usize| curves.iter().filter(move |curve| curve.trace == trace);
+            let fraction = |(x, y): &(f64, f64)| (panel.x.scale.fraction(*x), panel.y.scale.fraction(*y));
+            let fractions = |curve: &Curve| -> Vec<(f64, f64)> { curve.points.iter().map(fraction).collect() };
+            let is_same = |(one, other): (&Curve, &Curve)| {
+                one.rank == other.rank && coincide::anywhere(&fractions(one), &fractions(other))
             };
-            one.len() == other.len() && one.iter().zip(&other).all(is_same)
+            own(one).count() == own(other).count() && own(one).zip(own(other)).all(is_same)
         })
     })
 }
@@ -274,7 +259,7 @@ fn draw(mut panel: Panel, curves: Vec<Curve>, traces: &[TraceFile], leaders: &[u
         let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
         panel.layers.push(Layer::Line(points.clone(), stroke));
         if traces[trace].is_marked() && rank == 0 {
-            panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(trace))).collect()));
+            panel.layers.push(Layer::marks(points, trace));
         }
     }
     panel

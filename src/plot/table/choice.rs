@@ -1,31 +1,10 @@
 //! The choice of axes and columns: from the request, else from the varying axes.
 
-use super::Request;
 use super::filtered::{FilteredTable, Values};
 use super::lines;
 use super::map;
+use super::{Request, TablePicture};
 use crate::plot::PlotError;
-
-/// The defaults of a picture.
-#[derive(Debug, Clone, Copy)]
-pub struct Defaults {
-    /// Horizontal axes, in the order of preference.
-    pub x: &'static [&'static str],
-    /// Vertical axes of a map.
-    pub y: &'static [&'static str],
-    /// Columns of words that colour a map if they vary.
-    pub classes: &'static [&'static str],
-    /// Columns that colour a map otherwise: the first one with a value.
-    pub value: &'static [&'static str],
-    /// Columns of lines, one panel each.
-    pub lines: &'static [&'static str],
-    /// Axes whose values have separate lines.
-    pub series: &'static [&'static str],
-    /// Least number of values of both axes for a map.
-    pub least_map: usize,
-    /// Whether scattered points, such as materials, always make a map, since lines between them have no meaning.
-    pub scatters: bool,
-}
 
 /// A map or lines.
 #[derive(Debug, Clone)]
@@ -41,7 +20,7 @@ pub enum Shape {
 /// # Errors
 ///
 /// A column that the table does not have, or a combination of options without a picture.
-pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) -> Result<Shape, PlotError> {
+pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Request) -> Result<Shape, PlotError> {
     let choice = Choice::new(filtered, defaults, request)?;
     let (x, y, colour) = (request.x.as_deref(), request.y.as_deref(), request.colour.as_deref());
     let is_axis = |name: &&str| filtered.axis(name).is_some();
@@ -77,9 +56,9 @@ pub fn choose(filtered: &FilteredTable, defaults: &Defaults, request: &Request) 
     if let Some(y) = y.filter(|y| !filtered.words(y).is_empty()) {
         return Err(PlotError::Words { column: y.to_owned() });
     }
-    let preferred = || choice.find(defaults.x, colour, defaults.least_map.min(MANY_VALUES));
-    let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 3)).or_else(|| choice.longest());
-    let preferred = || preferred().or_else(|| choice.find(defaults.x, colour, 2));
+    let of_at_least = |values: usize| choice.find(defaults.x, colour, values);
+    let preferred = || of_at_least(defaults.least_map.min(MANY_VALUES)).or_else(|| of_at_least(3));
+    let preferred = || preferred().or_else(|| choice.longest()).or_else(|| of_at_least(2));
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
@@ -93,14 +72,18 @@ const MANY_VALUES: usize = 12;
 /// The inputs of a choice.
 struct Choice<'a> {
     filtered: &'a FilteredTable,
-    defaults: &'a Defaults,
+    defaults: &'a TablePicture,
     request: &'a Request,
     varying: Vec<&'a Values>,
 }
 
 impl<'a> Choice<'a> {
     /// A choice for a request whose columns all exist.
-    fn new(filtered: &'a FilteredTable, defaults: &'a Defaults, request: &'a Request) -> Result<Choice<'a>, PlotError> {
+    fn new(
+        filtered: &'a FilteredTable,
+        defaults: &'a TablePicture,
+        request: &'a Request,
+    ) -> Result<Choice<'a>, PlotError> {
         if let Some(x) = &request.x {
             filtered.check("--x", "axis", x)?;
         }

@@ -77,10 +77,9 @@ impl Condition {
         if text.contains(" or ") || text.to_lowercase().contains(" in ") {
             return Err(wrong());
         }
-        // The first sign; of several at one position, the longest.
+        // The first sign; of several at one position, the longest, which comes first in `SIGNS`.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
-        let (place, length, relation) =
-            found.min_by_key(|(place, length, _)| (*place, 2 - *length)).ok_or_else(wrong)?;
+        let (place, length, relation) = found.min_by_key(|(place, ..)| *place).ok_or_else(wrong)?;
         let (column, value) = (text[..place].trim(), text[place + length..].trim().trim_matches(['"', '\'']));
         if column.is_empty() || value.is_empty() || value.starts_with(['<', '>', '=', '!']) {
             return Err(wrong());

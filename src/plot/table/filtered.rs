@@ -50,11 +50,16 @@ impl Values {
         self.values.len() > 1
     }
 
+    /// The word of a value, if the axis has words.
+    fn word(&self, value: f64) -> Option<&String> {
+        self.words.get(value as usize).filter(|_| value >= 0.0)
+    }
+
     /// A value in markup.
     pub fn shown(&self, value: f64) -> String {
-        match self.words.get(value as usize) {
-            Some(word) if value >= 0.0 => word.replace('_', " "),
-            _ => label::number_among(value, &self.values),
+        match self.word(value) {
+            Some(word) => word.replace('_', " "),
+            None => label::number_among(value, &self.values),
         }
     }
 
@@ -78,10 +83,7 @@ impl Values {
 
     /// A value as typed by a user: a word, if the column has words.
     fn typed(&self, value: f64) -> String {
-        match self.words.get(value as usize) {
-            Some(word) if value >= 0.0 => word.clone(),
-            _ => format!("{value:?}").trim_end_matches(".0").to_owned(),
-        }
+        self.word(value).cloned().unwrap_or_else(|| format!("{value:?}").trim_end_matches(".0").to_owned())
     }
 }
 
@@ -262,10 +264,6 @@ impl FilteredTable {
 
     /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`FilteredTable::words`]; NaN
     /// for null.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read.
     pub fn each(&self, columns: &[&str], mut visit: impl FnMut(&[f64])) -> Result<(), PlotError> {
         self.each_while(columns, |row| {
             visit(row);
@@ -274,10 +272,6 @@ impl FilteredTable {
     }
 
     /// Calls `visit` for rows as [`FilteredTable::each`] does, until it returns `false`.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read.
     pub fn each_while(&self, columns: &[&str], mut visit: impl FnMut(&[f64]) -> bool) -> Result<(), PlotError> {
         let tested = self.conditions.iter().map(|condition| condition.column.as_str());
         let names: IndexSet<&str> = columns.iter().copied().chain(tested).collect();
@@ -314,10 +308,6 @@ impl FilteredTable {
     }
 
     /// The `axes` with a single value for each combination of `given`, which distinguish no rows. Empty if `given` have too many values.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read.
     pub fn determined(&self, axes: &[&str], given: &[&str]) -> Result<Vec<bool>, PlotError> {
         let mut determined = vec![true; axes.len()];
         let mut known: HashMap<Vec<u64>, Vec<u64>> = HashMap::new();
@@ -340,10 +330,6 @@ impl FilteredTable {
     }
 
     /// Whether two axes rise or fall together: each value of `x` comes with one of `y`, in order.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read.
     pub fn follows(&self, y: &str, x: &str) -> Result<bool, PlotError> {
         let mut known: HashMap<u64, [f64; 2]> = HashMap::new();
         let mut follows = true;

@@ -10,7 +10,7 @@ use crate::model::Units;
 use crate::numerics::cubic::Cubic;
 use crate::plot::PlotError;
 use crate::plot::canvas::Stroke;
-use crate::plot::contour::{Field, contour};
+use crate::plot::contour::contour;
 use crate::plot::figure::{Entry, Key, Layer};
 use crate::table::OPTIMUM_AXES;
 
@@ -21,10 +21,6 @@ const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
 const STEPS: usize = 300;
 
 /// Adds the border and the best shortcut to a map of the landscape.
-///
-/// # Errors
-///
-/// A part that cannot be read.
 pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigure) -> Result<(), PlotError> {
     if scene.filtered.table != "gap" || plan.x != ALPHAS[0] || plan.y != ALPHAS[1] {
         return Ok(());
@@ -38,9 +34,9 @@ pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigur
         if let Some(Border { lines, meets_zero }) = bound(scene, groups, place, cells) {
             any_line |= !lines.is_empty();
             any_zero |= meets_zero;
-            panel.layers.push(Layer::Contour(lines, stroke.clone()));
+            panel.layers.push(Layer::Contour(lines, stroke));
         }
-        let star = if from_table { best[place] } else { least[place].map(|(x, y, _)| (x, y)) };
+        let star = if from_table { best[place] } else { least[place] };
         any_star |= star.is_some();
         panel.layers.extend(star.map(Layer::Star));
     }
@@ -94,7 +90,7 @@ fn bound(scene: &TableScene<'_>, groups: &Groups, panel: usize, cells: &[AxisCel
             is_zero.push(theta <= 0.0 && excess >= 0.0);
         }
     }
-    let lines = contour(Field { columns: STEPS + 1, rows: STEPS + 1, values: &margin }, 0.0);
+    let lines = contour(&margin, STEPS + 1);
     let place = |(x, y): (f64, f64)| (cells[0].scale.value(x / STEPS as f64), cells[1].scale.value(y / STEPS as f64));
     let is_inside = |node: Option<usize>| node.and_then(|node| margin.get(node)).is_some_and(|margin| *margin > 0.0);
     let neighbours =

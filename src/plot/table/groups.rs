@@ -22,10 +22,6 @@ const MAX_CROSSED_PANELS: usize = 4;
 
 /// The varying axes that are not drawn and that distinguish rows, and a note on axes that change only with them. A grid axis always
 /// distinguishes rows.
-///
-/// # Errors
-///
-/// A part that cannot be read.
 pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         filtered.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
@@ -45,10 +41,6 @@ pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&
 }
 
 /// Whether the rows are scattered points over `x`, such as materials: an axis that changes with `x` is not monotone in it.
-///
-/// # Errors
-///
-/// A part that cannot be read.
 pub fn is_scattered(filtered: &FilteredTable, x: &str, further: &[&str]) -> Result<bool, PlotError> {
     for axis in filtered.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
         if !further.contains(&axis.name.as_str()) && !filtered.follows(&axis.name, x)? {
@@ -147,10 +139,6 @@ pub enum GroupRole {
 
 impl Groups {
     /// The groups of the rows of `filtered` as panels over the `drawn` axes, and a note on axes that change only with others.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read.
     pub fn of_panels(filtered: &FilteredTable, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(filtered, drawn)?;
         Ok((Groups::new(filtered, &further, GroupRole::Panels, None)?, along))
@@ -159,10 +147,6 @@ impl Groups {
     /// The groups of the rows of `filtered` over `axes`. If a figure cannot show all of them, all values of `series`, or of the last axis, at one or
     /// more values of the other axes; beyond `MAX_GROUPS`, one group of all rows. Two independent axes make rows and columns of panels, also for
     /// pairs without rows.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read.
     pub fn new(
         filtered: &FilteredTable,
         axes: &[&str],

@@ -5,7 +5,7 @@ use super::filtered::FilteredTable;
 use super::groups::{self, GroupRole, Groups};
 use crate::plot::colour;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
-use crate::plot::scale::Scale;
+use crate::plot::scale::{Scale, range};
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, coincide, label};
 
@@ -192,7 +192,7 @@ impl Rows {
         };
         // A column of zeros needs no negative range.
         let scale = if scale.low == 0.0 && scale.high == 0.0 { Scale { high: 1.0, ..scale } } else { scale };
-        let axis = |column: &String, scale| Axis { column: column.clone(), unit: filtered.unit(column), scale };
+        let axis = |column: &str, scale| Axis::new(column, &filtered.unit(column), scale);
         let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(MARK_ROOM[1])));
         Some(Graph {
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
@@ -239,7 +239,7 @@ impl Rows {
 
     /// The panel with the curves that are drawn.
     fn draw(&self, Graph { mut panel, curves, .. }: Graph, leaders: &[usize]) -> Panel {
-        for (series, mut points) in curves.into_iter().enumerate().filter(|(series, _)| leaders[*series] == *series) {
+        for (series, points) in curves.into_iter().enumerate().filter(|(series, _)| leaders[*series] == *series) {
             if !self.are_scattered {
                 panel.layers.push(Layer::Line(points.clone(), colour::series(series)));
             }
@@ -249,8 +249,7 @@ impl Rows {
             });
             panel.layers.push(Layer::Names(named.collect()));
             if self.is_marked(&points) {
-                points.retain(|(_, value)| value.is_finite());
-                panel.layers.push(Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(series))).collect()));
+                panel.layers.push(Layer::marks(points, series));
             }
         }
         panel
@@ -275,6 +274,6 @@ impl Graph {
 
 /// The common value, if all values are equal.
 fn constant(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let (low, high) = range(values);
     (high - low <= CONSTANT_RTOL * low.abs().max(high.abs())).then_some(low)
 }

@@ -6,7 +6,7 @@ use super::groups::Groups;
 use super::lines::MAX_NAMED_ROWS;
 use crate::plot::colour::{class, viridis};
 use crate::plot::export::image;
-use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Map, Panel};
+use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Panel};
 use crate::plot::scale::Scale;
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, label};
@@ -51,7 +51,7 @@ pub struct MapFigure {
     /// The group of each panel.
     pub groups: Groups,
     /// For each panel, the cell of the least value with status `ok`.
-    pub least: Vec<Option<(f64, f64, f64)>>,
+    pub least: Vec<Option<(f64, f64)>>,
     /// The cells of both axes.
     pub cells: [AxisCells; 2],
 }
@@ -95,8 +95,7 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
     let no_value = groups.retain(&mut sheets, |sheet| is_full || has_value(sheet));
     let shading = Shading::new(filtered, &plan.value, &sheets)?;
     let mut figure = groups.figure(0.8);
-    let axis =
-        |name: &String, cells: &AxisCells| Axis { column: name.clone(), unit: filtered.unit(name), scale: cells.scale };
+    let axis = |name: &str, cells: &AxisCells| Axis::new(name, &filtered.unit(name), cells.scale);
     for (place, sheet) in sheets.iter().enumerate() {
         figure.panels.push(Panel {
             title: groups.title(place),
@@ -111,7 +110,7 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
     let unbounded = [&plan.x, &plan.y].into_iter().find(unbounded);
     let unbounded = unbounded.map(|name| format!("Rows with {} = ∞ have no place in the map.", label::name(name)));
     figure.notes.extend(along.into_iter().chain(no_value).chain(unbounded).chain(raster.note(plan)));
-    let least = sheets.iter().map(|sheet| sheet.least).collect();
+    let least = sheets.iter().map(|sheet| sheet.least.map(|(x, y, _)| (x, y))).collect();
     Ok(MapFigure { figure, groups, least, cells: raster.cells })
 }
 
@@ -149,7 +148,6 @@ impl Raster {
         let labels = if is_named { filtered.label_columns() } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
         let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
-        let ok = Status::ALL.iter().position(|status| *status == Status::Ok).unwrap_or(0) as f64;
         filtered.each(&wanted, |row| {
             let &[x, y, found, status, ref rest @ ..] = row else { return };
             let (key, labels) = rest.split_at(axes.len());
@@ -171,7 +169,10 @@ impl Raster {
                 sheet.value[cell] = found;
                 sheet.status[cell] = status.min((Status::ALL.len() - 1) as f64) as u8 + 1;
             }
-            if status == ok && !found.is_nan() && sheet.least.is_none_or(|(.., least)| found < least) {
+            if status == f64::from(Status::Ok as u8)
+                && !found.is_nan()
+                && sheet.least.is_none_or(|(.., least)| found < least)
+            {
                 sheet.least = Some((x, y, found));
             }
         })?;
@@ -189,8 +190,7 @@ impl Raster {
             return vec![Layer::Marks(sheet.dots.iter().zip(&sheet.value).map(dot).collect()), Layer::Names(names)];
         }
         let image = pixels(&self.cells, |cell| shading.colour(sheet.value[cell]));
-        let hover = || Some(hover(&self.cells, sheet, &shading.words, shading.column));
-        let filled = image.map(|png| Layer::Map(Map { png, hover: hover() }));
+        let filled = image.map(|png| Layer::Map(png, hover(&self.cells, sheet, shading)));
         [Layer::Hatch].into_iter().chain(filled).collect()
     }
 
@@ -316,21 +316,22 @@ fn pixels(cells: &[AxisCells; 2], colour: impl Fn(usize) -> Option<[u8; 3]>) -> 
     image(sizes[0], &pixels)
 }
 
-fn hover(cells: &[AxisCells; 2], sheet: &PanelCells, words: &[String], column: &str) -> Hover {
+/// The numbers and words of a panel under the pointer.
+fn hover([x, y]: &[AxisCells; 2], sheet: &PanelCells, shading: &Shading<'_>) -> Hover {
     let mut all: Vec<String> = vec!["no row".to_owned()];
     all.extend(Status::ALL.iter().map(|status| status.name().to_owned()));
     let mut word = sheet.status.clone();
-    let mut numbers = sheet.value.clone();
-    if !words.is_empty() {
+    let mut values = sheet.value.clone();
+    if !shading.words.is_empty() {
         let offset = all.len() as u8;
-        all.extend(words.iter().cloned());
-        for (word, value) in word.iter_mut().zip(&mut numbers) {
+        all.extend(shading.words.iter().cloned());
+        for (word, value) in word.iter_mut().zip(&mut values) {
             if !value.is_nan() {
                 *word = offset + *value as u8;
                 *value = f64::NAN;
             }
         }
     }
-    let [x, y] = cells;
-    Hover { x: x.middles.clone(), y: y.middles.clone(), values: numbers, words: all, word, column: column.to_owned() }
+    let column = shading.column.to_owned();
+    Hover { x: x.middles.clone(), y: y.middles.clone(), values, words: all, word, column }
 }

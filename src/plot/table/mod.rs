@@ -17,7 +17,7 @@ use crate::dataset::{Folder, Manifest};
 use crate::grid::{Quantity, Scale};
 use crate::model::{Friction, Units};
 
-use choice::{Defaults, Shape};
+use choice::Shape;
 pub use condition::Condition;
 use filtered::FilteredTable;
 
@@ -46,11 +46,26 @@ pub struct Source {
     units: Units,
 }
 
-/// The picture of a table: its title and its defaults.
+/// The picture of a table: its title, and what it shows by default.
 struct TablePicture {
     table: &'static str,
     title: &'static str,
-    defaults: Defaults,
+    /// Horizontal axes, in the order of preference.
+    x: &'static [&'static str],
+    /// Vertical axes of a map.
+    y: &'static [&'static str],
+    /// Columns of words that colour a map if they vary.
+    classes: &'static [&'static str],
+    /// Columns that colour a map otherwise: the first one with a value.
+    value: &'static [&'static str],
+    /// Columns of lines, one panel each.
+    lines: &'static [&'static str],
+    /// Axes whose values have separate lines.
+    series: &'static [&'static str],
+    /// Least number of values of both axes for a map.
+    least_map: usize,
+    /// Whether scattered points, such as materials, always make a map, since lines between them have no meaning.
+    scatters: bool,
 }
 
 /// The source of a picture.
@@ -60,7 +75,9 @@ struct TableScene<'a> {
 }
 
 /// Defaults of pictures of optimal protocols and best shortcuts.
-const PROTOCOL_DEFAULTS: Defaults = Defaults {
+const PROTOCOL_DEFAULTS: TablePicture = TablePicture {
+    table: "",
+    title: "",
     x: &["t_f", "v_f", "v_i", "b", "a"],
     y: &["v_f", "v_i", "b", "a"],
     classes: &[],
@@ -72,156 +89,129 @@ const PROTOCOL_DEFAULTS: Defaults = Defaults {
 };
 
 /// Defaults of phase diagrams.
-const SPRING_DEFAULTS: Defaults = Defaults {
+const SPRING_DEFAULTS: TablePicture = TablePicture {
     x: &["v_f", "k", "m", "b", "a"],
     y: &["k", "v_i", "m", "b"],
-    classes: &[],
-    value: &[],
-    lines: &[],
     series: &["k"],
     least_map: 5,
     scatters: true,
+    ..PROTOCOL_DEFAULTS
 };
 
 /// Axes whose infinite value means that there is no ceiling, which is not stated.
 const CEILINGS: [&str; 2] = ["v_ceiling", "tau_ceiling"];
 
 /// Defaults of a picture with its own drawing code.
-const OWN_DRAWING: Defaults = Defaults {
-    x: &["t_f", "v_f", "v_i", "b", "a"],
-    y: &[],
-    least_map: usize::MAX,
-    lines: &["shortcuts"],
-    ..PROTOCOL_DEFAULTS
-};
+const OWN_DRAWING: TablePicture =
+    TablePicture { y: &[], least_map: usize::MAX, lines: &["shortcuts"], ..PROTOCOL_DEFAULTS };
 
 /// The picture of each table. A new table needs an entry here, and a file if it has special marks.
 const TABLE_PICTURES: [TablePicture; 13] = [
     TablePicture {
         table: "gap",
         title: "Work gap of the cubic shortcuts",
-        defaults: Defaults {
-            x: &["alpha_2", "alpha_3", "t_f"],
-            y: &["alpha_3"],
-            value: &["gap", "work"],
-            lines: &["gap", "v_min"],
-            least_map: 2,
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["alpha_2", "alpha_3", "t_f"],
+        y: &["alpha_3"],
+        value: &["gap", "work"],
+        lines: &["gap", "v_min"],
+        least_map: 2,
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "best_cubic",
         title: "Best cubic shortcut",
-        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..PROTOCOL_DEFAULTS },
+        value: &["gap"],
+        lines: &["gap", "alpha_2", "alpha_3", "v_min"],
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "optimal",
         title: "Optimal protocol",
-        defaults: Defaults {
-            x: &["t_f", "v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
-            y: &["v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
-            classes: &["binding", "strategy"],
-            value: &["work"],
-            lines: &["work", "v_start", "time_at_floor", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["t_f", "v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
+        y: &["v_ceiling", "tau_ceiling", "v_f", "v_i", "b", "a"],
+        classes: &["binding", "strategy"],
+        value: &["work"],
+        lines: &["work", "v_start", "time_at_floor", "dwork_dv_ceiling", "dwork_dtau_ceiling"],
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "feedback",
         title: "Optimal velocity by state and time left",
-        defaults: Defaults {
-            x: &["theta", "t_left", "v_ceiling", "tau_ceiling", "v_f", "b", "a"],
-            y: &["t_left", "v_ceiling", "tau_ceiling", "v_f"],
-            classes: &["arc"],
-            value: &["v"],
-            lines: &["v", "work_to_go", "gain"],
-            series: &["t_left", "v_ceiling", "tau_ceiling"],
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["theta", "t_left", "v_ceiling", "tau_ceiling", "v_f", "b", "a"],
+        y: &["t_left", "v_ceiling", "tau_ceiling", "v_f"],
+        classes: &["arc"],
+        value: &["v"],
+        lines: &["v", "work_to_go", "gain"],
+        series: &["t_left", "v_ceiling", "tau_ceiling"],
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "crossover",
         title: "Durations at which the optimal strategy changes",
-        defaults: Defaults {
-            x: &["v_f", "v_i", "b", "a"],
-            y: &["v_i", "b", "a"],
-            value: &["t_cross", "t_floor", "t_cheapest", "t_turn", "t_min"],
-            lines: &["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"],
-            series: &["b", "a"],
-            least_map: 5,
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["v_f", "v_i", "b", "a"],
+        y: &["v_i", "b", "a"],
+        value: &["t_cross", "t_floor", "t_cheapest", "t_turn", "t_min"],
+        lines: &["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"],
+        series: &["b", "a"],
+        least_map: 5,
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "shortcut",
         title: "Families of shortcuts",
-        defaults: Defaults {
-            x: &["t_f", "v_f", "v_i", "tau_ceiling", "b", "a"],
-            y: &[],
-            value: &["gap", "work"],
-            lines: &["gap", "v_max"],
-            series: &["family"],
-            least_map: usize::MAX,
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["t_f", "v_f", "v_i", "tau_ceiling", "b", "a"],
+        y: &[],
+        value: &["gap", "work"],
+        lines: &["gap", "v_max"],
+        series: &["family"],
+        least_map: usize::MAX,
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "stability",
         title: "Stability of steady sliding",
-        defaults: Defaults {
-            classes: &["stable_f", "hopf_type"],
-            value: &["growth_rate", "k_c_f", "stable_f"],
-            lines: &["growth_rate", "frequency", "k_c_f"],
-            ..SPRING_DEFAULTS
-        },
+        classes: &["stable_f", "hopf_type"],
+        value: &["growth_rate", "k_c_f", "stable_f"],
+        lines: &["growth_rate", "frequency", "k_c_f"],
+        ..SPRING_DEFAULTS
     },
     TablePicture {
         table: "step_response",
         title: "Outcome of the step response",
-        defaults: Defaults {
-            classes: &["outcome", "stick_slip"],
-            value: &["v_peak", "cycle_peak", "outcome"],
-            lines: &["v_peak", "v_trough", "settling_time", "period"],
-            ..SPRING_DEFAULTS
-        },
+        classes: &["outcome", "stick_slip"],
+        value: &["v_peak", "cycle_peak", "outcome"],
+        lines: &["v_peak", "v_trough", "settling_time", "period"],
+        ..SPRING_DEFAULTS
     },
     TablePicture {
         table: "compliant",
         title: "Smooth shortcut on a spring",
-        defaults: Defaults {
-            x: &["t_f", "k", "dt", "m", "v_f"],
-            y: &["k", "m", "v_f", "v_i"],
-            value: &["sampling_error", "amplification", "v_c_min"],
-            lines: &["amplification", "sampling_error", "v_c_min", "v_c_max"],
-            series: &["k", "dt"],
-            least_map: 12,
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["t_f", "k", "dt", "m", "v_f"],
+        y: &["k", "m", "v_f", "v_i"],
+        value: &["sampling_error", "amplification", "v_c_min"],
+        lines: &["amplification", "sampling_error", "v_c_min", "v_c_max"],
+        series: &["k", "dt"],
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "regularised",
         title: "Optimum with its jumps made smooth",
-        defaults: Defaults {
-            x: &["delta_t", "t_f", "k", "m", "v_f"],
-            y: &["t_f", "k", "v_f"],
-            value: &["gap"],
-            lines: &["gap", "v_c_max", "v_c_min"],
-            series: &["t_f", "k"],
-            least_map: 12,
-            ..PROTOCOL_DEFAULTS
-        },
+        x: &["delta_t", "t_f", "k", "m", "v_f"],
+        y: &["t_f", "k", "v_f"],
+        value: &["gap"],
+        lines: &["gap", "v_c_max", "v_c_min"],
+        series: &["t_f", "k"],
+        ..PROTOCOL_DEFAULTS
     },
     TablePicture {
         table: "gap_min",
         title: "Least work gap of the cubic shortcuts",
-        defaults: Defaults { value: &["gap"], lines: &["gap", "alpha_2", "alpha_3", "v_min"], ..PROTOCOL_DEFAULTS },
+        value: &["gap"],
+        lines: &["gap", "alpha_2", "alpha_3", "v_min"],
+        ..PROTOCOL_DEFAULTS
     },
-    TablePicture {
-        table: "gap_quantiles",
-        title: "Quantiles of the work gap of the cubic shortcuts",
-        defaults: OWN_DRAWING,
-    },
-    TablePicture { table: "gap_histogram", title: "Cubic shortcuts by their work gap", defaults: OWN_DRAWING },
+    TablePicture { table: "gap_quantiles", title: "Quantiles of the work gap of the cubic shortcuts", ..OWN_DRAWING },
+    TablePicture { table: "gap_histogram", title: "Cubic shortcuts by their work gap", ..OWN_DRAWING },
 ];
 
 impl Source {
@@ -249,7 +239,7 @@ impl Source {
     pub fn figure(&self, table: &str, request: &Request) -> Result<Figure, PlotError> {
         let mut filtered = FilteredTable::new(&self.folder, &self.manifest, table, &request.conditions)?;
         let front = front(&filtered, request)?;
-        if let Some(ParetoFront { hidden, .. }) = &front {
+        if let Some((_, hidden)) = front {
             let conditions = [request.conditions.clone(), Condition::all(&format!("{hidden}=inf"))?].concat();
             filtered = FilteredTable::new(&self.folder, &self.manifest, table, &conditions)?;
         }
@@ -260,7 +250,7 @@ impl Source {
             "gap_histogram" if is_default => reduced::histogram(&filtered)?,
             "gap_quantiles" if is_default => reduced::quantiles(&filtered)?,
             _ => {
-                let shape = choice::choose(&filtered, &picture.defaults, request)?;
+                let shape = choice::choose(&filtered, picture, request)?;
                 let drawn = match &shape {
                     Shape::Map(plan) => vec![plan.x.clone(), plan.y.clone()],
                     Shape::Lines(plan) => vec![plan.x.clone()],
@@ -271,7 +261,7 @@ impl Source {
         figure.title = picture.title.to_owned();
         let same = [fixed(&filtered, &drawn), figure.subtitle].into_iter().filter(|words| !words.is_empty());
         figure.subtitle = same.collect::<Vec<_>>().join(", ");
-        if let Some(ParetoFront { hidden, drawn }) = front {
+        if let Some((drawn, hidden)) = front {
             figure.remarks.push(format!("rows of {drawn} alone; draw those of {hidden} with --x {hidden}"));
         }
         if filtered.missing > 0 {
@@ -281,15 +271,9 @@ impl Source {
     }
 }
 
-/// One of two sets of rows, each with one ceiling alone.
-struct ParetoFront {
-    /// The ceiling of the other rows.
-    hidden: &'static str,
-    drawn: &'static str,
-}
-
-/// The front to draw where both ceilings vary, but never together: that of the requested ceiling, else of the one with most values.
-fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<ParetoFront>, PlotError> {
+/// The ceiling of the rows to draw and that of the hidden rows, where both ceilings vary, but never together: the requested ceiling is drawn, else
+/// the one with most values.
+fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<(&'static str, &'static str)>, PlotError> {
     let [v, tau] = CEILINGS;
     let values = |name| filtered.axis(name).filter(|axis| axis.varies() && axis.infinite).map(|axis| axis.values.len());
     let (Some(of_v), Some(of_tau)) = (values(v), values(tau)) else { return Ok(None) };
@@ -304,8 +288,7 @@ fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<ParetoFro
         both_finite = row.iter().all(|ceiling| ceiling.is_finite());
         !both_finite
     })?;
-    let (drawn, hidden) = if draws_v { (v, tau) } else { (tau, v) };
-    Ok((!both_finite).then_some(ParetoFront { hidden, drawn }))
+    Ok((!both_finite).then_some(if draws_v { (v, tau) } else { (tau, v) }))
 }
 
 /// The values common to all rows.
@@ -313,9 +296,7 @@ fn fixed(filtered: &FilteredTable, drawn: &[String]) -> String {
     let mut words = Vec::new();
     for axis in filtered.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
         match axis.values.as_slice() {
-            [one] if !axis.infinite => {
-                words.push(axis.text_of(*one));
-            }
+            [one] if !axis.infinite => words.push(axis.text_of(*one)),
             [] if axis.infinite && !CEILINGS.contains(&axis.name.as_str()) => {
                 words.push(format!("{} = ∞", label::name(&axis.name)))
             }

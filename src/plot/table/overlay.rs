@@ -224,15 +224,15 @@ pub fn marks(scene: &TableScene<'_>, plan: &lines::LineColumns, lined: &mut Line
     }
     // Of coinciding lines, one is drawn.
     for group in (0..count).filter(|&group| lined.leaders[group] == group) {
-        let colour = if count == 1 { "#555".to_owned() } else { colour::series(group).colour };
+        let colour = if count == 1 { "#555" } else { colour::series(group).colour };
+        let stroke = Stroke { colour, width: 0.5, dashes: &[2.0, 1.5] };
         for (name, place) in marks_of(scene, &lined.groups, group, &plan.x) {
             let place = place.map(|place| place * scene.size(&plan.x));
             let Some(at) = place.filter(|at| (lined.x.low..=lined.x.high).contains(at)) else { continue };
-            let stroke = Stroke { colour: colour.clone(), width: 0.5, dashes: &[2.0, 1.5] };
             for (place, panel) in lined.figure.panels.iter_mut().enumerate() {
                 // The first panel labels the marks.
                 let words = if place == 0 { label::name(name) } else { String::new() };
-                panel.layers.push(Layer::Vertical(at, words, stroke.clone()));
+                panel.layers.push(Layer::Vertical(at, words, stroke));
             }
         }
     }

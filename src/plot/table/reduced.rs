@@ -6,9 +6,8 @@ use super::groups::Groups;
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
-use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, colour, label};
-use crate::table::{HISTOGRAM_EDGES, REDUCED, Table};
+use crate::table::{self, HISTOGRAM_EDGES, Table};
 
 /// The horizontal axes, in the order of preference.
 const HORIZONTAL_AXES: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
@@ -41,16 +40,11 @@ const MAX_POSITIONS: usize = 1024;
 
 /// The columns of a reduced table, without the number of shortcuts.
 fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
-    let table = REDUCED.iter().map(|(_, table)| *table).find(|table| table.name() == filtered.table);
-    let names = table.into_iter().flat_map(Table::columns).skip(1).map(|column| column.name);
+    let names = table::find(&filtered.table).into_iter().flat_map(Table::columns).skip(1).map(|column| column.name);
     names.filter(|name| filtered.has(name)).collect()
 }
 
 /// Histogram: numbers of shortcuts by decade of the gap.
-///
-/// # Errors
-///
-/// A part that cannot be read.
 pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(filtered);
     let (groups, along) = Groups::of_panels(filtered, &[])?;
@@ -81,8 +75,8 @@ pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), Plot
         let bars = edges.iter().zip(counts).map(|(&(from, to), &count)| (from, to, count));
         figure.panels.push(Panel {
             title: groups.title(place),
-            x: Axis { column: "gap".to_owned(), unit: "1".to_owned(), scale: x },
-            y: Axis { column: "shortcuts".to_owned(), unit: "1".to_owned(), scale: y },
+            x: Axis::new("gap", "1", x),
+            y: Axis::new("shortcuts", "1", y),
             layers: vec![Layer::Bars(bars.collect(), INNER)],
         });
     }
@@ -105,10 +99,6 @@ fn edges() -> Vec<(f64, f64)> {
 }
 
 /// Bands of the quantiles of the gap over an axis; for a single landscape, the fraction of its shortcuts over the gap.
-///
-/// # Errors
-///
-/// A part that cannot be read.
 pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
     let varies = |name: &&&str| filtered.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
     let across = HORIZONTAL_AXES
@@ -147,8 +137,8 @@ fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Res
     for (group, drawn) in quantiles.iter().enumerate() {
         figure.panels.push(Panel {
             title: groups.title(group),
-            x: Axis { column: across.to_owned(), unit: filtered.unit(across), scale: cells.ends().with_room(0.02) },
-            y: Axis { column: "gap".to_owned(), unit: "1".to_owned(), scale: y },
+            x: Axis::new(across, &filtered.unit(across), cells.ends().with_room(0.02)),
+            y: Axis::new("gap", "1", y),
             layers: drawn.layers(),
         });
     }
@@ -178,8 +168,7 @@ impl Quantiles<'_> {
             let points: Vec<(f64, f64)> = self.cells.middles.iter().copied().zip(column.iter().copied()).collect();
             layers.push(Layer::Line(points.clone(), colour::series(series)));
             if self.is_marked() {
-                let points = points.into_iter().filter(|(_, value)| value.is_finite());
-                layers.push(Layer::Marks(points.map(|at| (at, Symbol::of_series(series))).collect()));
+                layers.push(Layer::marks(points, series));
             }
         }
         layers
@@ -205,16 +194,9 @@ fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<(Fi
     let x = Scale::of(points.iter().map(|(gap, _)| *gap)).ok_or(PlotError::Nothing)?.with_room(0.04);
     let panel = Panel {
         title: String::new(),
-        x: Axis { column: "gap".to_owned(), unit: "1".to_owned(), scale: x },
-        y: Axis {
-            column: "shortcuts of at most this gap".to_owned(),
-            unit: "%".to_owned(),
-            scale: Scale { low: 0.0, high: 100.0, log: false }.with_room(0.04),
-        },
-        layers: vec![
-            Layer::Line(points.clone(), Stroke::solid("#000", 1.1)),
-            Layer::Marks(points.into_iter().map(|at| (at, Symbol::of_series(0))).collect()),
-        ],
+        x: Axis::new("gap", "1", x),
+        y: Axis::new("shortcuts of at most this gap", "%", Scale { low: 0.0, high: 100.0, log: false }.with_room(0.04)),
+        layers: vec![Layer::Line(points.clone(), Stroke::solid("#000", 1.1)), Layer::marks(points, 0)],
     };
     Ok((Figure { columns: 1, aspect: 0.7, panels: vec![panel], ..Figure::default() }, Vec::new()))
 }
