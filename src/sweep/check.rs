@@ -204,13 +204,13 @@ impl Sweep {
         let mut stores: Vec<(u64, Arc<OptimumCache>)> = Vec::new();
         let store = |request: &Request| {
             if !request.needs_optimum(&self.grid) {
-                return Arc::new(OptimumCache::new(0, self.bounded, request.rtol));
+                return Arc::new(OptimumCache::new(0, 0));
             }
             let key = request.rtol.to_bits();
             if let Some((_, store)) = stores.iter().find(|(known, _)| *known == key) {
                 return store.clone();
             }
-            let store = Arc::new(OptimumCache::among(tuples, span, self.bounded, request.rtol).with(self.friction));
+            let store = Arc::new(OptimumCache::new(tuples, span));
             stores.push((key, store.clone()));
             store
         };
