@@ -116,15 +116,6 @@ pub struct Block {
 }
 
 impl Block {
-    /// Whether some point may have another value of `quantity` than `only`.
-    pub fn has_other(&self, quantity: Quantity, only: f64) -> bool {
-        match self.axis(quantity).map(|axis| &axis.values) {
-            Some(Values::List(values)) => values.iter().any(|value| *value != only),
-            Some(Values::Linspace { .. } | Values::Geomspace { .. }) => true,
-            None => self.derived.iter().any(|derived| derived.quantity == quantity),
-        }
-    }
-
     /// The axis of `quantity`, if a factor contains it.
     pub fn axis(&self, quantity: Quantity) -> Option<&Axis> {
         self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)
@@ -152,14 +143,20 @@ impl Block {
         derived.or_else(|| self.axis(quantity).map(|axis| axis.scale))
     }
 
-    /// The factor axes on which `quantities` depend.
-    pub fn roots(&self, quantities: &[Quantity]) -> Vec<Quantity> {
-        let mut roots = quantities.to_vec();
+    /// `quantities`, and all axes in the expressions of those that are computed.
+    pub fn with_reads(&self, quantities: &[Quantity]) -> Vec<Quantity> {
+        let mut all = quantities.to_vec();
         for derived in self.derived.iter().rev() {
-            if roots.contains(&derived.quantity) {
-                roots.extend(derived.expression.reads());
+            if all.contains(&derived.quantity) {
+                all.extend(derived.expression.reads());
             }
         }
+        all
+    }
+
+    /// The factor axes on which `quantities` depend.
+    pub fn roots(&self, quantities: &[Quantity]) -> Vec<Quantity> {
+        let mut roots = self.with_reads(quantities);
         roots.retain(|quantity| self.axis(*quantity).is_some());
         roots
     }

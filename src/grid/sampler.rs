@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::axis::{Axis, Values};
 use super::block::{Block, Derived, Digit, Digits, Label};
-use super::expression::{Columns, Expression, Stack};
+use super::expression::{Expression, Scratch};
 use super::quantity::Quantity;
 
 /// Greatest number of tabulated values of a range. Chosen: they fit the cache of a core.
@@ -40,18 +40,10 @@ impl Source<'_> {
     /// The column that it fills.
     fn column<'s>(&self, scratch: &'s mut Scratch) -> &'s mut Vec<f64> {
         match &self.content {
-            Content::Axis(axis, _) => scratch.columns.get_mut(axis.quantity),
-            Content::Label(number, _) => scratch.columns.label_mut(*number),
+            Content::Axis(axis, _) => scratch.column_mut(axis.quantity),
+            Content::Label(number, _) => scratch.label_mut(*number),
         }
     }
-}
-
-/// The scratch memory of one thread.
-#[derive(Default)]
-pub struct Scratch {
-    columns: Columns,
-    stack: Stack,
-    length: usize,
 }
 
 impl<'a> Sampler<'a> {
@@ -67,15 +59,8 @@ impl<'a> Sampler<'a> {
                 sources.push(Source { digit: *digit, content: Content::Axis(axis, table) });
             }
         }
-        let mut wanted = quantities.to_vec();
-        let mut derived: Vec<&Derived> = Vec::new();
-        for one in block.derived.iter().rev() {
-            if wanted.contains(&one.quantity) {
-                wanted.extend(one.expression.reads());
-                derived.push(one);
-            }
-        }
-        derived.reverse();
+        let wanted = block.with_reads(quantities);
+        let derived = block.derived.iter().filter(|one| wanted.contains(&one.quantity)).collect();
         Sampler { sources, derived }
     }
 
@@ -129,20 +114,8 @@ impl<'a> Sampler<'a> {
 
     fn derive(&self, scratch: &mut Scratch) {
         for one in &self.derived {
-            let values = scratch.evaluate(&one.expression).to_vec();
-            *scratch.columns.get_mut(one.quantity) = values;
+            let values = one.expression.evaluate(scratch).to_vec();
+            *scratch.column_mut(one.quantity) = values;
         }
-    }
-}
-
-impl Scratch {
-    /// The values of a quantity at the last evaluated rows.
-    pub fn column(&self, quantity: Quantity) -> &[f64] {
-        self.columns.get(quantity)
-    }
-
-    /// The values of an expression at the last evaluated rows.
-    pub fn evaluate(&mut self, expression: &Expression) -> &[f64] {
-        expression.evaluate(&self.columns, self.length, &mut self.stack)
     }
 }

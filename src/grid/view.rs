@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use super::axis::Axis;
 use super::block::Digit;
+use super::expression::Scratch;
 use super::quantity::{Point, Quantity};
 use super::row_index::{RowIndex, Tuples};
-use super::sampler::{Sampler, Scratch};
+use super::sampler::Sampler;
 
 /// Points of an evaluation batch. Chosen: their columns fit the cache of a core.
 const BATCH_POINTS: usize = 1 << 10;

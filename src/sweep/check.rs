@@ -374,7 +374,7 @@ fn draft(
         return None;
     };
     let is_reduction_known = !faults.concern(&format!("{key}.reduce"));
-    let has_ceiling = |block: &Block| block.has_other(Quantity::VelocityCeiling, f64::INFINITY);
+    let has_ceiling = |block: &Block| block.may_be(Quantity::VelocityCeiling, f64::is_finite);
     let has_ceiling = blocks.iter().filter_map(|block| block.block.as_ref()).any(has_ceiling);
     let has_laws = has_ceiling || blocks.iter().any(|block| block.held.contains(&Quantity::Law));
     // A reduced table is one of ageing, without ceilings.
