@@ -62,7 +62,7 @@ impl RowFilter {
         // A row is kept if the condition holds for any step of the factors that are not in the rows.
         factors.extend(reads.iter().filter(|factor| !digits.digits.iter().any(|digit| digit.factor == **factor)));
         let all = Digits::new(block, &factors).filter(|all| all.rows <= MAX_COMBINATIONS)?;
-        let sampler = Sampler::new(block, &all, &condition.reads()).with_labels(block, &all, Some(condition));
+        let sampler = Sampler::new(block, &all, &[], Some(condition));
         let hidden = all.rows / combinations;
         let bits = |visible, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, visible, scratch);
         let bytes = in_chunks(combinations, all.rows, bits).concat();
@@ -208,7 +208,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     reads.extend(block.condition.iter().flat_map(Expression::reads));
     let roots = block.roots(&reads);
     let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MAX_COMBINATIONS)?;
-    let sampler = Sampler::new(block, &digits, &reads).with_labels(block, &digits, block.condition.as_ref());
+    let sampler = Sampler::new(block, &digits, &[quantity], block.condition.as_ref());
     let search = |rows: Range<u64>, scratch: &mut Scratch| -> Option<u64> {
         let mut start = rows.start;
         while start < rows.end {

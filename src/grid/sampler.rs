@@ -47,33 +47,32 @@ impl Source<'_> {
 }
 
 impl<'a> Sampler<'a> {
-    /// An evaluator of `quantities` and the axes in their expressions, for rows over `digits`.
-    pub fn new(block: &'a Block, digits: &Digits, quantities: &[Quantity]) -> Sampler<'a> {
-        let roots = block.roots(quantities);
+    /// An evaluator of `quantities`, of the axes and labels in `condition`, and of the axes in their expressions, for rows over `digits`.
+    pub fn new(
+        block: &'a Block,
+        digits: &Digits,
+        quantities: &[Quantity],
+        condition: Option<&Expression>,
+    ) -> Sampler<'a> {
+        let wanted: Vec<Quantity> =
+            quantities.iter().copied().chain(condition.iter().flat_map(|it| it.reads())).collect();
+        let wanted = block.with_reads(&wanted);
+        let labels: Vec<(Quantity, usize)> = condition.iter().flat_map(|condition| condition.labels()).collect();
         let mut sources = Vec::new();
         for digit in &digits.digits {
-            for axis in block.factors[digit.factor].axes.iter().filter(|axis| roots.contains(&axis.quantity)) {
+            let factor = &block.factors[digit.factor];
+            for axis in factor.axes.iter().filter(|axis| wanted.contains(&axis.quantity)) {
                 let is_range = !matches!(axis.values, Values::List(_));
                 let table = (is_range && digit.len <= MAX_TABLE_VALUES)
                     .then(|| (0..digit.len).map(|step| axis.values.at(step)).collect());
                 sources.push(Source { digit: *digit, content: Content::Axis(axis, table) });
             }
-        }
-        let wanted = block.with_reads(quantities);
-        let derived = block.derived.iter().filter(|one| wanted.contains(&one.quantity)).collect();
-        Sampler { sources, derived }
-    }
-
-    /// Adds the labels of `condition`.
-    pub fn with_labels(mut self, block: &'a Block, digits: &Digits, condition: Option<&Expression>) -> Sampler<'a> {
-        for (axis, number) in condition.iter().flat_map(|condition| condition.labels()) {
-            let holds = |digit: &&Digit| block.factors[digit.factor].holds_any(&[axis]);
-            if let Some(digit) = digits.digits.iter().find(holds) {
-                let label = &block.factors[digit.factor].labels[number];
-                self.sources.push(Source { digit: *digit, content: Content::Label(number, label) });
+            for &(_, number) in labels.iter().filter(|(axis, _)| factor.holds_any(&[*axis])) {
+                sources.push(Source { digit: *digit, content: Content::Label(number, &factor.labels[number]) });
             }
         }
-        self
+        let derived = block.derived.iter().filter(|one| wanted.contains(&one.quantity)).collect();
+        Sampler { sources, derived }
     }
 
     /// The length of runs with constant quantities, in rows, from a multiple of this number; `None` if they never change.

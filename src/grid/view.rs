@@ -78,7 +78,7 @@ impl<'a> View<'a> {
                 return point;
             }
             let mut scratch = Scratch::default();
-            Sampler::new(block, &block_rows.digits, &made).pick(&[segment.raw.start], &mut scratch);
+            Sampler::new(block, &block_rows.digits, &made, None).pick(&[segment.raw.start], &mut scratch);
             for quantity in made {
                 point[quantity] = scratch.column(quantity)[0];
             }
@@ -109,7 +109,7 @@ impl<'a> View<'a> {
                 runs.take_steps(digit, axis, group);
                 continue;
             }
-            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity]);
+            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
             for segment in group {
                 let stride = sampler.run().unwrap_or(u64::MAX);
                 let mut raw = segment.raw.start;
