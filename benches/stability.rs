@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sweep = Sweep::load(&folder)?;
     std::fs::remove_file(&folder)?;
     let plan = Plan::new(&sweep);
-    let (optima, signal, pool) = (OptimumCache::new(0, true, 1.0), Signal::default(), sweep::pool(1)?);
+    let (optima, signal, pool) = (OptimumCache::new(0, 0), Signal::default(), sweep::pool(1)?);
     let (request, table) = (&sweep.requests[0], &plan.tables[0]);
     let job = sweep.job(request, &optima, &signal);
     let mut least = f64::INFINITY;

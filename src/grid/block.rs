@@ -87,7 +87,7 @@ fn is_monotone(values: &Values) -> bool {
 }
 
 /// A hash of `bits`: the finaliser of SplitMix64 (Steele, Lea and Flood 2014, doi:10.1145/2714064.2660195).
-fn mixed(bits: u64) -> u64 {
+pub(crate) fn mixed(bits: u64) -> u64 {
     let bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     bits ^ (bits >> 31)
@@ -116,15 +116,6 @@ pub struct Block {
 }
 
 impl Block {
-    /// Whether some point may have another value of `quantity` than `only`.
-    pub fn has_other(&self, quantity: Quantity, only: f64) -> bool {
-        match self.axis(quantity).map(|axis| &axis.values) {
-            Some(Values::List(values)) => values.iter().any(|value| *value != only),
-            Some(Values::Linspace { .. } | Values::Geomspace { .. }) => true,
-            None => self.derived.iter().any(|derived| derived.quantity == quantity),
-        }
-    }
-
     /// The axis of `quantity`, if a factor contains it.
     pub fn axis(&self, quantity: Quantity) -> Option<&Axis> {
         self.factors.iter().flat_map(|factor| &factor.axes).find(|axis| axis.quantity == quantity)
@@ -152,14 +143,20 @@ impl Block {
         derived.or_else(|| self.axis(quantity).map(|axis| axis.scale))
     }
 
-    /// The factor axes on which `quantities` depend.
-    pub fn roots(&self, quantities: &[Quantity]) -> Vec<Quantity> {
-        let mut roots = quantities.to_vec();
+    /// `quantities`, and all axes in the expressions of those that are computed.
+    pub fn with_reads(&self, quantities: &[Quantity]) -> Vec<Quantity> {
+        let mut all = quantities.to_vec();
         for derived in self.derived.iter().rev() {
-            if roots.contains(&derived.quantity) {
-                roots.extend(derived.expression.reads());
+            if all.contains(&derived.quantity) {
+                all.extend(derived.expression.reads());
             }
         }
+        all
+    }
+
+    /// The factor axes on which `quantities` depend.
+    pub fn roots(&self, quantities: &[Quantity]) -> Vec<Quantity> {
+        let mut roots = self.with_reads(quantities);
         roots.retain(|quantity| self.axis(*quantity).is_some());
         roots
     }

@@ -11,6 +11,7 @@ mod sampler;
 mod view;
 
 pub use axis::{Axis, Values};
+pub(crate) use block::mixed;
 pub use block::{Block, Derived, Digit, Digits, Factor, Label};
 pub use design::Design;
 pub use expression::{Expression, Fault};

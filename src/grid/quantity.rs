@@ -52,31 +52,20 @@ pub enum Quantity {
 pub struct Domain {
     /// The range in words, as in `1 < v_i <= 1e12`.
     pub text: &'static str,
-    least: f64,
-    least_excluded: bool,
-    greatest: f64,
-    apart: Option<f64>,
+    /// The lower end of its interval.
+    pub least: f64,
+    /// Whether that is excluded.
+    pub least_excluded: bool,
+    /// The upper end of its interval, which is included.
+    pub greatest: f64,
+    /// The isolated legal value, 0 or infinity, if any.
+    pub apart: Option<f64>,
 }
 
 impl Domain {
     /// The numbers from `least` to `greatest`.
     const fn new(text: &'static str, least: f64, greatest: f64) -> Domain {
         Domain { text, least, least_excluded: false, greatest, apart: None }
-    }
-
-    /// The lower end of its interval, and whether that is excluded.
-    pub fn least(&self) -> (f64, bool) {
-        (self.least, self.least_excluded)
-    }
-
-    /// The upper end of its interval, which is included.
-    pub fn greatest(&self) -> f64 {
-        self.greatest
-    }
-
-    /// The isolated legal value, 0 or infinity, if any.
-    pub fn apart(&self) -> Option<f64> {
-        self.apart
     }
 
     /// Whether `value` is in the range; NaN never is.
@@ -297,20 +286,20 @@ mod tests {
         let book = include_str!("../../docs/spec.md");
         for quantity in Quantity::ALL.into_iter().filter(|quantity| quantity.words().is_empty()) {
             let domain = quantity.domain();
-            let (least, is_excluded) = domain.least();
-            let below = if is_excluded { "<" } else { "<=" };
+            let Domain { least, least_excluded, greatest, .. } = domain;
+            let below = if least_excluded { "<" } else { "<=" };
             let short = |number: f64| {
                 if number.abs() <= 10.0 && number.fract() == 0.0 { format!("{number}") } else { format!("{number:e}") }
             };
-            let interval = format!("{} {below} {} <= {}", short(least), quantity.name(), short(domain.greatest()));
+            let interval = format!("{} {below} {} <= {}", short(least), quantity.name(), short(greatest));
             let rest = domain.text.strip_prefix(&interval).unwrap_or_else(|| panic!("{interval}: {domain}"));
-            let apart = domain.apart().map_or(String::new(), |apart| format!(", or {apart}"));
+            let apart = domain.apart.map_or(String::new(), |apart| format!(", or {apart}"));
             assert!(rest.starts_with(&apart) && rest.is_empty() == apart.is_empty(), "{domain}");
             assert!(book.contains(&format!("| `{}` | {domain} |", quantity.name())), "{domain}");
-            for edge in [least, domain.greatest()] {
-                assert_eq!(domain.contains(edge), edge != least || !is_excluded, "{domain}");
+            for edge in [least, greatest] {
+                assert_eq!(domain.contains(edge), edge != least || !least_excluded, "{domain}");
             }
-            for beyond in [least.next_down(), domain.greatest().next_up(), f64::NAN] {
+            for beyond in [least.next_down(), greatest.next_up(), f64::NAN] {
                 assert!(!domain.contains(beyond), "{domain}");
             }
         }

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use roaring::RoaringBitmap;
 
 use super::block::{Block, Digits};
-use super::expression::Expression;
+use super::expression::{Expression, Scratch};
 use super::quantity::Quantity;
-use super::sampler::{Sampler, Scratch};
+use super::sampler::Sampler;
 
 /// Combinations that a thread evaluates in one task, a multiple of 64. Chosen: some milliseconds.
 const CHUNK_COMBINATIONS: u64 = 1 << 16;
@@ -28,8 +28,7 @@ const MIN_PARALLEL_POINTS: u64 = 1 << 18;
 /// The rows of a product that a condition keeps.
 #[derive(Debug)]
 pub struct RowFilter {
-    /// Rows of the digits slower than all that are read.
-    lead: u64,
+    /// Slowest first, at least one.
     levels: Vec<Level>,
     /// Combinations of the digits that are read.
     combinations: u64,
@@ -47,16 +46,15 @@ impl RowFilter {
     /// The filter of rows over `digits` of `block`: a row is kept if the condition holds at any of its points. `None` beyond [`MAX_COMBINATIONS`].
     pub fn new(block: &Block, digits: &Digits, condition: &Expression) -> Option<RowFilter> {
         let reads = block.factors_of(&block.roots(&condition.reads()));
-        let (mut lead, mut levels, mut factors) = (1, Vec::<Level>::new(), Vec::new());
+        let (mut levels, mut factors) = (vec![Level { read: 1, free: 1 }], Vec::new());
         for digit in &digits.digits {
             let is_read = reads.contains(&digit.factor);
             if is_read {
                 factors.push(digit.factor);
             }
             match levels.last_mut() {
-                Some(level) if is_read && level.free == 1 => level.read *= digit.len,
                 Some(level) if !is_read => level.free *= digit.len,
-                None if !is_read => lead *= digit.len,
+                Some(level) if level.free == 1 => level.read *= digit.len,
                 _ => levels.push(Level { read: digit.len, free: 1 }),
             }
         }
@@ -64,11 +62,11 @@ impl RowFilter {
         // A row is kept if the condition holds for any step of the factors that are not in the rows.
         factors.extend(reads.iter().filter(|factor| !digits.digits.iter().any(|digit| digit.factor == **factor)));
         let all = Digits::new(block, &factors).filter(|all| all.rows <= MAX_COMBINATIONS)?;
-        let sampler = Sampler::new(block, &all, &condition.reads()).with_labels(block, &all, Some(condition));
+        let sampler = Sampler::new(block, &all, &[], Some(condition));
         let hidden = all.rows / combinations;
         let bits = |visible, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, visible, scratch);
         let bytes = in_chunks(combinations, all.rows, bits).concat();
-        Some(RowFilter { lead, levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
+        Some(RowFilter { levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
 
     /// Whether it keeps every row.
@@ -78,13 +76,13 @@ impl RowFilter {
 
     /// The number of kept rows.
     pub fn rows(&self) -> u64 {
-        self.lead * self.kept.len() * self.levels.iter().map(|level| level.free).product::<u64>()
+        self.kept.len() * self.levels.iter().map(|level| level.free).product::<u64>()
     }
 
     /// The kept rows with numbers `kept`, as ascending ranges of product rows.
     pub fn ranges(&self, kept: Range<u64>) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
-        let last = self.levels.last().copied().unwrap_or(Level { read: 1, free: 1 });
+        let last = self.levels[self.levels.len() - 1];
         let mut left = kept.end.saturating_sub(kept.start);
         while left > 0 {
             let Location { row, combination, mut inside } = self.locate(kept.end - left);
@@ -114,8 +112,7 @@ impl RowFilter {
     /// The location of a kept row.
     fn locate(&self, number: u64) -> Location {
         let mut free: u64 = self.levels.iter().map(|level| level.free).product();
-        let all = self.kept.len() * free;
-        let (mut row, mut rest) = (number / all, number % all);
+        let (mut row, mut rest) = (0, number);
         // The combinations with the digits found so far: the first one, and their number.
         let (mut first, mut count) = (0, self.combinations);
         for (place, level) in self.levels.iter().enumerate() {
@@ -177,7 +174,7 @@ fn evaluate(
     while start < end {
         let stop = (start + BATCH_POINTS).min(end);
         sampler.load(start..stop, scratch);
-        for (place, &holds) in scratch.evaluate(condition).iter().enumerate() {
+        for (place, &holds) in condition.evaluate(scratch).iter().enumerate() {
             if holds != 0.0 {
                 let bit = (start + place as u64) / hidden - visible.start;
                 bits[(bit / 8) as usize] |= 1 << (bit % 8);
@@ -211,13 +208,13 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     reads.extend(block.condition.iter().flat_map(Expression::reads));
     let roots = block.roots(&reads);
     let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MAX_COMBINATIONS)?;
-    let sampler = Sampler::new(block, &digits, &reads).with_labels(block, &digits, block.condition.as_ref());
+    let sampler = Sampler::new(block, &digits, &[quantity], block.condition.as_ref());
     let search = |rows: Range<u64>, scratch: &mut Scratch| -> Option<u64> {
         let mut start = rows.start;
         while start < rows.end {
             let stop = (start + BATCH_POINTS).min(rows.end);
             sampler.load(start..stop, scratch);
-            let kept = block.condition.as_ref().map(|condition| scratch.evaluate(condition).to_vec());
+            let kept = block.condition.as_ref().map(|condition| condition.evaluate(scratch).to_vec());
             let values = scratch.column(quantity);
             let found =
                 (0..values.len()).find(|&i| kept.as_ref().is_none_or(|kept| kept[i] != 0.0) && wrong(values[i]));

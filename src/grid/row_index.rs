@@ -201,7 +201,8 @@ impl RowIndex {
     /// keeps more than `most` rows.
     pub fn distinct(&self, quantities: &[Quantity], most: u64) -> u64 {
         let tuples = self.tuples(quantities);
-        let repeats = tuples.repeat();
+        // Several rows can have one tuple if a list repeats a value.
+        let repeats = tuples.parts.iter().flat_map(|part| &part.digits).any(|digit| digit.class_of.is_some());
         if self.blocks.iter().all(|block_rows| block_rows.row_filter.is_none()) {
             tuples.span
         } else if repeats && self.rows <= most {
@@ -243,11 +244,6 @@ impl Tuples {
     /// One more than the greatest number.
     pub fn span(&self) -> u64 {
         self.span
-    }
-
-    /// Whether several rows can have one tuple, because a list repeats a value.
-    pub fn repeat(&self) -> bool {
-        self.parts.iter().any(|part| part.digits.iter().any(|digit| digit.class_of.is_some()))
     }
 
     /// The tuple of product row `raw` of block `block`, and the first row after it that may have another tuple.

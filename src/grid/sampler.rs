@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::axis::{Axis, Values};
 use super::block::{Block, Derived, Digit, Digits, Label};
-use super::expression::{Columns, Expression, Stack};
+use super::expression::{Expression, Scratch};
 use super::quantity::Quantity;
 
 /// Greatest number of tabulated values of a range. Chosen: they fit the cache of a core.
@@ -40,55 +40,39 @@ impl Source<'_> {
     /// The column that it fills.
     fn column<'s>(&self, scratch: &'s mut Scratch) -> &'s mut Vec<f64> {
         match &self.content {
-            Content::Axis(axis, _) => scratch.columns.get_mut(axis.quantity),
-            Content::Label(number, _) => scratch.columns.label_mut(*number),
+            Content::Axis(axis, _) => scratch.column_mut(axis.quantity),
+            Content::Label(number, _) => scratch.label_mut(*number),
         }
     }
 }
 
-/// The scratch memory of one thread.
-#[derive(Default)]
-pub struct Scratch {
-    columns: Columns,
-    stack: Stack,
-    length: usize,
-}
-
 impl<'a> Sampler<'a> {
-    /// An evaluator of `quantities` and the axes in their expressions, for rows over `digits`.
-    pub fn new(block: &'a Block, digits: &Digits, quantities: &[Quantity]) -> Sampler<'a> {
-        let roots = block.roots(quantities);
+    /// An evaluator of `quantities`, of the axes and labels in `condition`, and of the axes in their expressions, for rows over `digits`.
+    pub fn new(
+        block: &'a Block,
+        digits: &Digits,
+        quantities: &[Quantity],
+        condition: Option<&Expression>,
+    ) -> Sampler<'a> {
+        let wanted: Vec<Quantity> =
+            quantities.iter().copied().chain(condition.iter().flat_map(|it| it.reads())).collect();
+        let wanted = block.with_reads(&wanted);
+        let labels: Vec<(Quantity, usize)> = condition.iter().flat_map(|condition| condition.labels()).collect();
         let mut sources = Vec::new();
         for digit in &digits.digits {
-            for axis in block.factors[digit.factor].axes.iter().filter(|axis| roots.contains(&axis.quantity)) {
+            let factor = &block.factors[digit.factor];
+            for axis in factor.axes.iter().filter(|axis| wanted.contains(&axis.quantity)) {
                 let is_range = !matches!(axis.values, Values::List(_));
                 let table = (is_range && digit.len <= MAX_TABLE_VALUES)
                     .then(|| (0..digit.len).map(|step| axis.values.at(step)).collect());
                 sources.push(Source { digit: *digit, content: Content::Axis(axis, table) });
             }
-        }
-        let mut wanted = quantities.to_vec();
-        let mut derived: Vec<&Derived> = Vec::new();
-        for one in block.derived.iter().rev() {
-            if wanted.contains(&one.quantity) {
-                wanted.extend(one.expression.reads());
-                derived.push(one);
+            for &(_, number) in labels.iter().filter(|(axis, _)| factor.holds_any(&[*axis])) {
+                sources.push(Source { digit: *digit, content: Content::Label(number, &factor.labels[number]) });
             }
         }
-        derived.reverse();
+        let derived = block.derived.iter().filter(|one| wanted.contains(&one.quantity)).collect();
         Sampler { sources, derived }
-    }
-
-    /// Adds the labels of `condition`.
-    pub fn with_labels(mut self, block: &'a Block, digits: &Digits, condition: Option<&Expression>) -> Sampler<'a> {
-        for (axis, number) in condition.iter().flat_map(|condition| condition.labels()) {
-            let holds = |digit: &&Digit| block.factors[digit.factor].holds_any(&[axis]);
-            if let Some(digit) = digits.digits.iter().find(holds) {
-                let label = &block.factors[digit.factor].labels[number];
-                self.sources.push(Source { digit: *digit, content: Content::Label(number, label) });
-            }
-        }
-        self
     }
 
     /// The length of runs with constant quantities, in rows, from a multiple of this number; `None` if they never change.
@@ -129,20 +113,8 @@ impl<'a> Sampler<'a> {
 
     fn derive(&self, scratch: &mut Scratch) {
         for one in &self.derived {
-            let values = scratch.evaluate(&one.expression).to_vec();
-            *scratch.columns.get_mut(one.quantity) = values;
+            let values = one.expression.evaluate(scratch).to_vec();
+            *scratch.column_mut(one.quantity) = values;
         }
-    }
-}
-
-impl Scratch {
-    /// The values of a quantity at the last evaluated rows.
-    pub fn column(&self, quantity: Quantity) -> &[f64] {
-        self.columns.get(quantity)
-    }
-
-    /// The values of an expression at the last evaluated rows.
-    pub fn evaluate(&mut self, expression: &Expression) -> &[f64] {
-        expression.evaluate(&self.columns, self.length, &mut self.stack)
     }
 }

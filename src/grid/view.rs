@@ -5,9 +5,10 @@ use std::ops::Range;
 
 use super::axis::Axis;
 use super::block::Digit;
+use super::expression::Scratch;
 use super::quantity::{Point, Quantity};
 use super::row_index::{RowIndex, Tuples};
-use super::sampler::{Sampler, Scratch};
+use super::sampler::Sampler;
 
 /// Points of an evaluation batch. Chosen: their columns fit the cache of a core.
 const BATCH_POINTS: usize = 1 << 10;
@@ -77,7 +78,7 @@ impl<'a> View<'a> {
                 return point;
             }
             let mut scratch = Scratch::default();
-            Sampler::new(block, &block_rows.digits, &made).pick(&[segment.raw.start], &mut scratch);
+            Sampler::new(block, &block_rows.digits, &made, None).pick(&[segment.raw.start], &mut scratch);
             for quantity in made {
                 point[quantity] = scratch.column(quantity)[0];
             }
@@ -108,7 +109,7 @@ impl<'a> View<'a> {
                 runs.take_steps(digit, axis, group);
                 continue;
             }
-            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity]);
+            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
             for segment in group {
                 let stride = sampler.run().unwrap_or(u64::MAX);
                 let mut raw = segment.raw.start;

@@ -204,13 +204,13 @@ impl Sweep {
         let mut stores: Vec<(u64, Arc<OptimumCache>)> = Vec::new();
         let store = |request: &Request| {
             if !request.needs_optimum(&self.grid) {
-                return Arc::new(OptimumCache::new(0, self.bounded, request.rtol));
+                return Arc::new(OptimumCache::new(0, 0));
             }
             let key = request.rtol.to_bits();
             if let Some((_, store)) = stores.iter().find(|(known, _)| *known == key) {
                 return store.clone();
             }
-            let store = Arc::new(OptimumCache::among(tuples, span, self.bounded, request.rtol).with(self.friction));
+            let store = Arc::new(OptimumCache::new(tuples, span));
             stores.push((key, store.clone()));
             store
         };
@@ -232,10 +232,8 @@ fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
     // The best shortcut has the units of these axes.
     let has_best = tables.iter().any(|table| table.name() == "best_cubic");
     let of_table = |quantity: Quantity| tables.iter().any(|table| table.axes().contains(&quantity));
-    let top = (!spec.block.is_empty()).then_some(&spec.block[..]).map_or_else(|| vec![spec.top()], <[_]>::to_vec);
     let mut warnings = Vec::new();
-    for (number, (written, block)) in top.iter().zip(&grid.blocks).enumerate() {
-        let prefix = if spec.block.is_empty() { String::new() } else { format!("block[{number}].") };
+    for ((prefix, written), block) in spec.blocks().zip(&grid.blocks) {
         let expressions = block.derived.iter().map(|derived| &derived.expression).chain(&block.condition);
         let read: Vec<Quantity> = expressions.flat_map(|expression| expression.reads()).collect();
         for quantity in written.axes.keys().filter_map(|name| Quantity::from_name(name)) {
@@ -284,24 +282,20 @@ pub fn check_name(name: &str) -> Result<(), SpecError> {
 
 /// The blocks of `spec`.
 fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults) -> Vec<Checked> {
-    let top = spec.top();
-    if spec.block.is_empty() {
-        return vec![block::check(&top, String::new(), units, folder, faults)];
-    }
+    let top = &spec.top;
     let outside = [
         ("axes", !top.axes.is_empty()),
         ("points", top.points.is_some()),
         ("zip", !top.zip.is_empty()),
         ("where", top.condition.is_some()),
     ];
-    for (key, _) in outside.into_iter().filter(|(_, is_there)| *is_there) {
+    for (key, _) in outside.into_iter().filter(|(_, is_there)| *is_there && !spec.block.is_empty()) {
         let (found, expected) =
             (format!("`{key}` outside of the blocks"), "everything about the grid in [[block]]s, or no block");
         faults.push(SpecError::new(key, found, expected, "move it into the blocks that it concerns"));
     }
-    let blocks = spec.block.iter().enumerate();
     let mut blocks: Vec<Checked> =
-        blocks.map(|(number, one)| block::check(one, format!("block[{number}]."), units, folder, faults)).collect();
+        spec.blocks().map(|(prefix, one)| block::check(one, prefix, units, folder, faults)).collect();
     complete(&mut blocks);
     for quantity in Quantity::ALL {
         let scale = |checked: &Checked| checked.block.as_ref()?.scale(quantity);
@@ -374,7 +368,7 @@ fn draft(
         return None;
     };
     let is_reduction_known = !faults.concern(&format!("{key}.reduce"));
-    let has_ceiling = |block: &Block| block.has_other(Quantity::VelocityCeiling, f64::INFINITY);
+    let has_ceiling = |block: &Block| block.may_be(Quantity::VelocityCeiling, f64::is_finite);
     let has_ceiling = blocks.iter().filter_map(|block| block.block.as_ref()).any(has_ceiling);
     let has_laws = has_ceiling || blocks.iter().any(|block| block.held.contains(&Quantity::Law));
     // A reduced table is one of ageing, without ceilings.

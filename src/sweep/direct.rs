@@ -157,7 +157,7 @@ impl Sweep {
         // Rows of a table over the axes of the optimum have an optimum each.
         let is_common = request.table.axes() != OPTIMUM_AXES && request.needs_optimum(&self.grid);
         let optima = if is_common { request.row_index.tuples(OPTIMUM_AXES).span() } else { 0 };
-        let optimum_cache = OptimumCache::new(optima, self.bounded, request.rtol).with(self.friction);
+        let optimum_cache = OptimumCache::new(optima, optima);
         let job = self.job(request, &optimum_cache, signal);
         request.table.compute(&job, 0..request.rows, &mut buffer)?;
         Ok(buffer)

@@ -14,7 +14,7 @@ use super::engine::{RunError, WRITERS, content, locked, pool};
 use super::plan::Plan;
 use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
 use crate::grid::Point;
-use crate::table::{ColumnBuffer, Job, OptimumCache, Signal};
+use crate::table::{ColumnBuffer, Job, OptimumCache, Signal, uncapped_optimum};
 
 /// Time for all samples of a sweep. Chosen: `plan` answers within two seconds where rows cost about the same.
 const SAMPLE_TIME: Duration = Duration::from_millis(1500);
@@ -219,15 +219,15 @@ impl<'a> CostSampler<'a> {
         else {
             return 0.0;
         };
-        // A cache without capacity: every request is solved.
-        let optima = OptimumCache::new(u64::MAX, self.sweep.bounded, self.sweep.optimum_rtol());
-        let optima = optima.with(self.sweep.friction);
+        let Sweep { bounded, friction, .. } = *self.sweep;
+        let rtol = self.sweep.optimum_rtol();
+        let solve = |point: &Point| _ = uncapped_optimum(point, bounded, friction, rtol);
         let (began, mut places) = (Instant::now(), rows.rows().min(MIN_RANGES));
         loop {
             let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);
             let points: Vec<Point> = starts.map(|row| self.sweep.grid.scaled(&rows.point(row))).collect();
             let start = Instant::now();
-            self.pool.install(|| points.par_iter().for_each(|point| _ = optima.get(0, point)));
+            self.pool.install(|| points.par_iter().for_each(solve));
             let each = start.elapsed().as_secs_f64() * self.pool.current_num_threads() as f64 / places as f64;
             let most = rows.rows().min(MAX_OPTIMA);
             if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {

@@ -65,7 +65,7 @@ pub fn check(
         return refuse(format!("{key}.columns"), found, "the other columns", format!("remove \"{column}\""));
     }
     for (quantity, only, expected) in RESTRICTED.into_iter().filter(|(quantity, ..)| table.axes().contains(quantity)) {
-        if block.has_other(quantity, only) {
+        if block.may_be(quantity, |value| value != only) {
             let found = format!("`{name}` supports no other {} with regularised friction", quantity.name());
             return refuse(key, found, expected, format!("remove the axis {}", quantity.name()));
         }

@@ -112,11 +112,7 @@ impl Sweep {
 fn block_facts(block: &Block, needed: &[Quantity], fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
     let mut needed = needed.to_vec();
     needed.extend(block.condition.iter().flat_map(|condition| condition.reads()));
-    for derived in block.derived.iter().rev() {
-        if needed.contains(&derived.quantity) {
-            needed.extend(derived.expression.reads());
-        }
-    }
+    let needed = block.with_reads(&needed);
     let mut order = Vec::new();
     let (mut axes, mut single) = (Vec::new(), Vec::new());
     for factor in &block.factors {

@@ -1,7 +1,7 @@
 //! What the evolution laws of the state demand of a spec: tables that know them, and bounds without which they have no optimum.
 
 use super::error::{SpecError, refuse};
-use crate::grid::{Block, Quantity, Values};
+use crate::grid::{Block, Quantity};
 use crate::model::StateLaw;
 use crate::table::Table;
 
@@ -70,15 +70,10 @@ fn check_interpolated(key: &str, table: &Table, block: &Block, prefix: &str) -> 
 /// block, are left to the rows.
 fn has_with_law(block: &Block, quantity: Quantity, is_wrong: fn(f64) -> bool) -> bool {
     let Some(axis) = block.axis(quantity) else { return false };
-    let is_wrong_at = |step: u64| is_wrong(axis.values.at(step));
     let together =
         block.factors.iter().find(|factor| factor.holds_any(&[Quantity::Law]) && factor.holds_any(&[quantity]));
     if let (Some(factor), Some(law)) = (together, block.axis(Quantity::Law)) {
-        return (0..factor.len()).any(|step| law.values.at(step) != 0.0 && is_wrong_at(step));
+        return (0..factor.len()).any(|step| law.values.at(step) != 0.0 && is_wrong(axis.values.at(step)));
     }
-    match &axis.values {
-        Values::List(values) => values.iter().any(|&value| is_wrong(value)),
-        // Both ends are finite.
-        Values::Linspace { .. } | Values::Geomspace { .. } => is_wrong_at(0),
-    }
+    block.may_be(quantity, is_wrong)
 }

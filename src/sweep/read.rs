@@ -196,12 +196,14 @@ impl Entry<'_> {
 
 /// Reads a struct from a TOML table, each key into its field. Missing keys keep their defaults.
 macro_rules! keys {
-    ($($table:ty { $($key:literal: $field:ident),+ })+) => { $(
+    ($($table:ty { $($key:literal: $($field:ident).+),+ })+) => { $(
         impl Read for $table {
             fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<Self> {
                 let mut read = Self::default();
                 entry.each(&[$($key),+], faults, |name, entry, faults| match name {
-                    $($key => read.$field = Read::read(entry, faults).unwrap_or(std::mem::take(&mut read.$field)),)+
+                    $($key => if let Some(value) = Read::read(entry, faults) {
+                        read.$($field).+ = value;
+                    })+
                     _ => {}
                 })?;
                 Some(read)

@@ -180,9 +180,9 @@ fn legal(quantity: Quantity, units: &Units) -> Map<String, Value> {
     let mut value = number(&domain);
     if *units != Units::Scaled {
         value.retain(|key, _| key == "type");
-        if domain.contains(0.0) && domain.least().0 >= 0.0 || domain.apart() == Some(0.0) {
+        if domain.contains(0.0) && domain.least >= 0.0 || domain.apart == Some(0.0) {
             value.insert("minimum".to_owned(), json!(0.0));
-        } else if domain.least().0 > 0.0 {
+        } else if domain.least > 0.0 {
             value.insert("exclusiveMinimum".to_owned(), json!(0.0));
         }
     }
@@ -191,10 +191,9 @@ fn legal(quantity: Quantity, units: &Units) -> Map<String, Value> {
 
 /// The schema of a number in this range; from 0 on if 0 is an isolated value, which would need two ranges.
 fn number(domain: &Domain) -> Map<String, Value> {
-    let (least, is_excluded) = domain.least();
-    let least = if domain.apart() == Some(0.0) { 0.0 } else { least };
-    let lower = if is_excluded { "exclusiveMinimum" } else { "minimum" };
-    let bounds = [("type", json!("number")), (lower, json!(least)), ("maximum", json!(domain.greatest()))];
+    let least = if domain.apart == Some(0.0) { 0.0 } else { domain.least };
+    let lower = if domain.least_excluded { "exclusiveMinimum" } else { "minimum" };
+    let bounds = [("type", json!("number")), (lower, json!(least)), ("maximum", json!(domain.greatest))];
     bounds.map(|(key, value)| (key.to_owned(), value)).into_iter().collect()
 }
 
@@ -218,8 +217,7 @@ fn form(quantity: Quantity, units: &Units) -> Value {
     }
     let mut below = end.clone();
     below.insert("exclusiveMaximum".to_owned(), json!(0.0));
-    let (least, _) = quantity.domain().least();
-    let sides = if least < 0.0 { vec![range(&above), range(&below)] } else { vec![range(&above)] };
+    let sides = if quantity.domain().least < 0.0 { vec![range(&above), range(&below)] } else { vec![range(&above)] };
     let names: Vec<&str> = quantity.scales().iter().map(|scale| unit_name(units, quantity, *scale)).collect();
     let spaced = |how: &str| format!("[first, last, count], evenly spaced{how}, both ends included");
     let expression = "Computed from other axes at every point, such as 10 * v_i";

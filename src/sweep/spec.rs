@@ -16,20 +16,14 @@ pub struct Spec {
     pub name: String,
     /// Description of the sweep.
     pub description: String,
-    /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
-    pub points: Option<PathBuf>,
-    /// Axes that advance together.
-    pub zip: Vec<Vec<String>>,
-    /// Condition of the points to keep.
-    pub condition: Option<String>,
+    /// The grid, if it is not in blocks.
+    pub top: BlockSpec,
     /// Blocks of a union of grids, each with its own axes.
     pub block: Vec<BlockSpec>,
     /// Model and units.
     pub model: ModelSpec,
     /// Requested accuracy.
     pub accuracy: AccuracySpec,
-    /// The axes, the last varies fastest.
-    pub axes: IndexMap<String, AxisSpec>,
     /// The tables to write.
     pub tables: IndexMap<String, TableSpec>,
 }
@@ -48,19 +42,16 @@ pub struct BlockSpec {
 }
 
 impl Spec {
-    /// The top level as a block.
-    pub fn top(&self) -> BlockSpec {
-        BlockSpec {
-            points: self.points.clone(),
-            zip: self.zip.clone(),
-            condition: self.condition.clone(),
-            axes: self.axes.clone(),
-        }
+    /// The blocks of the grid, and the prefix of the keys of each: those of the spec, or its top level.
+    pub fn blocks(&self) -> impl Iterator<Item = (String, &BlockSpec)> {
+        let top = self.block.is_empty().then(|| (String::new(), &self.top));
+        let blocks = self.block.iter().enumerate().map(|(number, block)| (format!("block[{number}]."), block));
+        top.into_iter().chain(blocks)
     }
 
     /// The first definition of an axis.
     pub fn axis(&self, name: &str) -> Option<&AxisSpec> {
-        self.axes.get(name).or_else(|| self.block.iter().find_map(|block| block.axes.get(name)))
+        self.blocks().find_map(|(_, block)| block.axes.get(name))
     }
 }
 
@@ -162,8 +153,8 @@ pub struct TableSpec {
 
 keys! {
     Spec {
-        "name": name, "description": description, "points": points, "zip": zip, "where": condition, "block": block,
-        "model": model, "accuracy": accuracy, "axes": axes, "tables": tables
+        "name": name, "description": description, "points": top.points, "zip": top.zip, "where": top.condition,
+        "block": block, "model": model, "accuracy": accuracy, "axes": top.axes, "tables": tables
     }
     BlockSpec { "points": points, "zip": zip, "where": condition, "axes": axes }
     ModelSpec {

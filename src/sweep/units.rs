@@ -85,14 +85,13 @@ fn range(units: &Units, quantity: Quantity, unit: &'static str) -> String {
         if (1e-3..1e6).contains(&value) || value == 0.0 { format!("{value}") } else { format!("{value:e}") }
     };
     let name = if name == "1" { String::new() } else { format!(" {name}") };
-    let (least, is_excluded) = domain.least();
-    let below = if is_excluded { "<" } else { "<=" };
-    let apart = domain.apart().map_or(String::new(), |apart| format!(", or {apart}"));
+    let below = if domain.least_excluded { "<" } else { "<=" };
+    let apart = domain.apart.map_or(String::new(), |apart| format!(", or {apart}"));
     let interval = format!(
         "{} {below} {} <= {}{name}{apart}",
-        short(least * size),
+        short(domain.least * size),
         quantity.name(),
-        short(domain.greatest() * size)
+        short(domain.greatest * size)
     );
     format!("{interval} ({unit} = {}{name})", short(size))
 }
@@ -117,21 +116,16 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
 /// Velocity in m/s above which SI values are probably scaled values. Chosen: brakes slide at up to 50 m/s, faults at some 10 m/s.
 const MAX_PLAUSIBLE_VELOCITY: f64 = 50.0;
 
-/// Scales of SI units above which they are probably in other units. Chosen: faults slip over centimetres to reach steady friction, and friction
-/// coefficients are about 1.
-const MAX_PLAUSIBLE_SCALES: [(&str, f64, &str); 2] = [("l", 1.0, "m"), ("mu_0", 10.0, "1")];
-
-/// The warnings on scales of `model` that are probably in other units.
+/// The warnings on scales of `model` that are probably in other units. Limits chosen: faults slip over centimetres to reach steady friction, and
+/// friction coefficients are about 1.
 pub fn doubtful_scales(model: &ModelSpec) -> Vec<SpecError> {
-    let given = [model.l, model.mu_0];
-    let pairs = MAX_PLAUSIBLE_SCALES.into_iter().zip(given);
-    let large = pairs.filter_map(|((name, most, unit), given)| Some((name, most, unit, given.filter(|x| *x > most)?)));
-    let warning = |(name, most, unit, value): (&str, f64, &str, f64)| {
-        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-        let expected = format!("usually below {most}{unit}");
-        SpecError::new(format!("model.{name}"), format!("{value}{unit} is unusually large"), expected, "check the unit")
-    };
-    large.map(warning).collect()
+    let scales = [("l", model.l, 1.0, " m"), ("mu_0", model.mu_0, 10.0, "")];
+    let large = scales.into_iter().filter_map(|(name, given, most, unit)| {
+        let value = given.filter(|value| *value > most)?;
+        let (found, expected) = (format!("{value}{unit} is unusually large"), format!("usually below {most}{unit}"));
+        Some(SpecError::new(format!("model.{name}"), found, expected, "check the unit"))
+    });
+    large.collect()
 }
 
 /// The warning that `axis`, whose key begins with `prefix`, is probably not in SI units, if so.

@@ -76,10 +76,13 @@ fn needs_optimum(projection: &Projection) -> bool {
 }
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let members = MemberCache::default();
+    // The members by tuple, stiffness and mass, each solved once for all sampling intervals.
+    let members = Memo::<(u64, u64, u64), Solution>::default();
     rows::each(job, range, 4, buffer, FIELDS, |tuple, point| {
         let mut work = RunStats::default();
-        let Solution { solved, amplification, work_error } = members.get(job, tuple, point, &mut work);
+        let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
+        let key = (tuple, slider.k.to_bits(), slider.m.to_bits());
+        let Solution { solved, amplification, work_error } = members.get(key, || solve(job, point, &mut work));
         let Some(member) = solved.value else { return (solved.status, None, work) };
         let mut status = solved.status;
         let mut least = Comparison::NONE;
@@ -89,7 +92,6 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
             least = optimum_cache::compare(job, (tuple, point), &without_ceilings(job), works, bounded, &mut work);
             status = status.compared_with(least.optimum);
         }
-        let (slider, t_f, dt) = (slider(point), point[Quantity::Time], point[Quantity::Sampling]);
         let is_held = job.projection.has(SAMPLING_ERROR) && dt > 0.0;
         let is_followed = job.projection.has(OPEN_LOOP_ERROR);
         let held = is_held.then(|| held_error(&slider, velocities(point), t_f, dt, job.rtol));
@@ -120,30 +122,21 @@ struct Solution {
     work_error: f64,
 }
 
-/// The members by tuple, stiffness and mass. Each is solved once for all sampling intervals.
-#[derive(Default)]
-struct MemberCache(Memo<(u64, u64, u64), Solution>);
-
-impl MemberCache {
-    /// The member for `point`, of tuple number `tuple`; adds the statistics of this call.
-    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
-        let slider = slider(point);
-        self.0.get((tuple, slider.k.to_bits(), slider.m.to_bits()), || {
-            let (velocities, t_f) = (velocities(point), point[Quantity::Time]);
-            let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
-            *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
-            let wanted = job.projection.has(AMPLIFICATION) && solved.value.is_some();
-            let amplification = wanted.then(|| amplification(&slider, velocities, t_f, job.rtol));
-            let amplification = amplification.and_then(|followed| value_of(followed, work));
-            let work_error =
-                solved.value.filter(|_| job.projection.has_any([WORK_ERROR, GAP_ERROR])).and_then(|member| {
-                    let finest = compliant::solve(&slider, velocities, t_f, error::TIGHTEST_RTOL);
-                    *work += RunStats::from(finest.stats);
-                    Some(error::bound(member.work, finest.value?.work, member.work))
-                });
-            Solution { solved, amplification, work_error: number(work_error) }
-        })
-    }
+/// The member for `point`; adds the statistics of the solve.
+fn solve(job: &Job<'_>, point: &Point, work: &mut RunStats) -> Solution {
+    let (slider, velocities, t_f) = (slider(point), velocities(point), point[Quantity::Time]);
+    let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
+    *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
+    let wanted = job.projection.has(AMPLIFICATION) && solved.value.is_some();
+    let amplification = wanted.then(|| amplification(&slider, velocities, t_f, job.rtol));
+    let amplification = amplification.and_then(|followed| value_of(followed, work));
+    let wanted = job.projection.has_any([WORK_ERROR, GAP_ERROR]);
+    let work_error = solved.value.filter(|_| wanted).and_then(|member| {
+        let finest = compliant::solve(&slider, velocities, t_f, error::TIGHTEST_RTOL);
+        *work += RunStats::from(finest.stats);
+        Some(error::bound(member.work, finest.value?.work, member.work))
+    });
+    Solution { solved, amplification, work_error: number(work_error) }
 }
 
 /// Block and spring of a point that holds at least `a`, `b`, `v_i`, `v_f`, `k` and `m`.

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::failpoint;
-use super::optimum_cache::{LAW_AXES, least_work, transition, without_ceilings, work_error};
+use super::optimum_cache::{LAW_AXES, cached_optimum, least_work, transition, without_ceilings, work_error};
 use super::rows::on_all_threads;
 use super::{Column, ColumnBuffer, Job, Projection, RunStats, Stopped, Table};
 use crate::grid::Quantity::{A, Alpha2, Alpha3, B, FinalVelocity, InitialVelocity, Law, Time, VelocityCeiling};
@@ -366,8 +366,7 @@ fn prepare(job: &Job<'_>, group: &LandscapeRows, point: &Point, work: &mut RunSt
     work.landscapes += 1;
     let mut error_optimal = f64::NAN;
     let optimum = needs_optimum(job.projection).then(|| {
-        let (solved, spent) = job.optimum_cache.get(group.tuple, point);
-        *work += spent;
+        let solved = cached_optimum(job, (group.tuple, point), work);
         if let Some(optimum) = solved.value.filter(|_| job.projection.has(GAP_ERROR)) {
             error_optimal = work_error(point, &without_ceilings(job), &optimum, work);
         }

@@ -25,7 +25,7 @@ use crate::model::{Friction, StateLaw};
 
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
-pub use optimum_cache::{OPTIMUM_AXES, OptimumCache};
+pub use optimum_cache::{OPTIMUM_AXES, OptimumCache, uncapped_optimum};
 #[cfg(feature = "plot")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MAX_SORTED;

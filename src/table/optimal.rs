@@ -164,7 +164,7 @@ fn regularised_row(job: &Job<'_>, (tuple, point): (u64, &Point), wants_slopes: b
         work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
         (solved.map(|found| found.optimum), solved.value.map(|found| found.slopes))
     } else {
-        (optimum_cache::optimum(job, (tuple, point), &optimum_cache::without_ceilings(job), &mut work), None)
+        (optimum_cache::cached_optimum(job, (tuple, point), &mut work), None)
     };
     let t_least = arcsinh::least_time(&transition);
     let is_infeasible = solved.status == Status::Infeasible;

@@ -44,13 +44,30 @@ pub fn slopes(job: &Job<'_>, point: &Point, bounds: &Bounds, work: &mut RunStats
     (solved, slopes)
 }
 
+/// The optimal protocol of `point` without ceilings, with `v >= 1` if `bounded`.
+pub fn uncapped_optimum(point: &Point, bounded: bool, friction: Friction, rtol: f64) -> Solved<Optimum> {
+    let (transition, t_f) = (transition(point), point[Quantity::Time]);
+    match friction {
+        Friction::Log => optimal::solve(&transition, t_f, bounded, rtol),
+        Friction::Regularised => arcsinh::solve(&transition, t_f).map(|found| found.optimum),
+    }
+}
+
+/// The optimal protocol of `point`, of tuple number `tuple`, without ceilings: from the cache of the tables. Adds the solver statistics to
+/// `work`.
+pub fn cached_optimum(job: &Job<'_>, (tuple, point): (u64, &Point), work: &mut RunStats) -> Solved<Optimum> {
+    job.optimum_cache.get(tuple, || {
+        let solved = uncapped_optimum(point, job.bounded, job.friction, job.rtol);
+        *work += RunStats { optima: 1, ..RunStats::from(solved.stats) };
+        solved
+    })
+}
+
 /// The optimal protocol of `point` under `bounds`: from the cache of the tables if there is no ceiling. `point` has tuple
 /// number `tuple`. Adds the solver statistics to `work`.
 pub fn optimum(job: &Job<'_>, (tuple, point): (u64, &Point), bounds: &Bounds, work: &mut RunStats) -> Solved<Optimum> {
     if !bounds.has_ceilings() {
-        let (solved, spent) = job.optimum_cache.get(tuple, point);
-        *work += spent;
-        return solved;
+        return cached_optimum(job, (tuple, point), work);
     }
     let solved = optimal::solve(&transition(point), point[Quantity::Time], bounds, job.rtol);
     *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
@@ -127,17 +144,9 @@ pub fn compare(
 /// An optimal protocol that is solved at most once.
 type Slot = OnceLock<Solved<Optimum>>;
 
-/// The cache of optimal protocols, by tuple number.
+/// The cache of optimal protocols without ceilings, by tuple number.
 #[derive(Debug)]
-pub struct OptimumCache {
-    slots: Slots,
-    bounded: bool,
-    friction: Friction,
-    rtol: f64,
-}
-
-#[derive(Debug)]
-enum Slots {
+pub enum OptimumCache {
     /// A slot for each number.
     Dense(Vec<Slot>),
     /// A slot for each number that occurs.
@@ -148,47 +157,23 @@ impl OptimumCache {
     /// Greatest number of tuples kept for a whole run. Chosen: about 100 MB; larger grids keep those of one part.
     pub const MAX_CACHED: u64 = 1 << 20;
 
-    /// A cache for `tuples` different transitions and durations, solved to `rtol`, with `v >= 1` if `bounded`.
-    pub fn new(tuples: u64, bounded: bool, rtol: f64) -> OptimumCache {
-        OptimumCache::among(tuples, tuples, bounded, rtol)
+    /// A cache for `tuples` different transitions and durations, with numbers below `span`.
+    pub fn new(tuples: u64, span: u64) -> OptimumCache {
+        if span > Self::MAX_CACHED && tuples <= Self::MAX_CACHED {
+            return OptimumCache::Sparse(Memo::default());
+        }
+        let kept = if span <= Self::MAX_CACHED { span as usize } else { 0 };
+        OptimumCache::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
     }
 
-    /// A cache for sparse tuple numbers below `span`.
-    pub fn among(tuples: u64, span: u64, bounded: bool, rtol: f64) -> OptimumCache {
-        let slots = if span > Self::MAX_CACHED && tuples <= Self::MAX_CACHED {
-            Slots::Sparse(Memo::default())
-        } else {
-            let kept = if span <= Self::MAX_CACHED { span as usize } else { 0 };
-            Slots::Dense(std::iter::repeat_with(OnceLock::new).take(kept).collect())
-        };
-        OptimumCache { slots, bounded, friction: Friction::Log, rtol }
-    }
-
-    /// This cache for `friction`.
-    #[must_use]
-    pub fn with(self, friction: Friction) -> OptimumCache {
-        OptimumCache { friction, ..self }
-    }
-
-    /// The optimal protocol of `point`, which has tuple number `tuple`; adds the statistics of this call.
-    pub fn get(&self, tuple: u64, point: &Point) -> (Solved<Optimum>, RunStats) {
-        let mut work = RunStats::default();
-        let mut solve = || {
-            let (transition, t_f) = (transition(point), point[Quantity::Time]);
-            let solved = match self.friction {
-                Friction::Log => optimal::solve(&transition, t_f, self.bounded, self.rtol),
-                Friction::Regularised => arcsinh::solve(&transition, t_f).map(|found| found.optimum),
-            };
-            work = RunStats { optima: 1, ..RunStats::from(solved.stats) };
-            solved
-        };
-        let solved = match &self.slots {
-            Slots::Dense(slots) => match usize::try_from(tuple).ok().and_then(|tuple| slots.get(tuple)) {
+    /// The optimal protocol with this tuple number, from `solve` if it is unknown.
+    fn get(&self, tuple: u64, solve: impl FnOnce() -> Solved<Optimum>) -> Solved<Optimum> {
+        match self {
+            OptimumCache::Dense(slots) => match usize::try_from(tuple).ok().and_then(|tuple| slots.get(tuple)) {
                 Some(slot) => *slot.get_or_init(solve),
                 None => solve(),
             },
-            Slots::Sparse(slots) => slots.get(tuple, solve),
-        };
-        (solved, work)
+            OptimumCache::Sparse(slots) => slots.get(tuple, solve),
+        }
     }
 }

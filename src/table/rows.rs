@@ -51,14 +51,7 @@ pub fn each<R>(
     on_all_threads(chunks, |chunk| {
         job.signal.check()?;
         let count = chunk.status.len() as u64;
-        let fill = |tuple: u64, point: &Point, cells: &mut [f64]| {
-            let (status, values, work) = row(tuple, point);
-            for (cell, &index) in cells.iter_mut().zip(job.projection.indices()) {
-                *cell = values.as_ref().map_or(f64::NAN, fields[index].cell);
-            }
-            (status, work)
-        };
-        let work = chunk.compute(job, &axes, &tuples, &fill);
+        let work = chunk.compute(job, &axes, &tuples, fields, &row);
         job.signal.advance(count);
         Ok(work)
     })
@@ -96,12 +89,13 @@ struct RowChunk<'a> {
 }
 
 impl RowChunk<'_> {
-    fn compute(
+    fn compute<R>(
         mut self,
         job: &Job<'_>,
         axes: &[Steps],
         tuples: &[Numbered],
-        fill: &impl Fn(u64, &Point, &mut [f64]) -> (Status, RunStats),
+        fields: &[Field<R>],
+        row: &impl Fn(u64, &Point) -> ComputedRow<R>,
     ) -> RunStats {
         let count = self.status.len();
         let values: Vec<(Quantity, Vec<f64>)> = axes
@@ -114,7 +108,7 @@ impl RowChunk<'_> {
                 (axis.quantity, values)
             })
             .collect();
-        let (mut point, mut cells) = (Point::default(), vec![f64::NAN; self.columns.len()]);
+        let mut point = Point::default();
         let mut work = RunStats::default();
         let mut tuple = tuples.partition_point(|(_, rows)| rows.end <= self.start);
         for place in 0..count {
@@ -126,10 +120,10 @@ impl RowChunk<'_> {
                 point[*quantity] = values[place];
             }
             failpoint::panic_at(std::iter::once(at));
-            let (status, spent) = fill(tuples[tuple].0, &point, &mut cells);
+            let (status, values, spent) = row(tuples[tuple].0, &point);
             self.status[place] = status;
-            for ((column, cell), size) in self.columns.iter_mut().zip(&cells).zip(job.sizes) {
-                column[place] = cell * size;
+            for ((column, &index), size) in self.columns.iter_mut().zip(job.projection.indices()).zip(job.sizes) {
+                column[place] = values.as_ref().map_or(f64::NAN, fields[index].cell) * size;
             }
             work += spent;
         }

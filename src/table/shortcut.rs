@@ -8,7 +8,6 @@ use super::optimum_cache::{self, Comparison, transition, without_ceilings};
 use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, place, rows};
 use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Time};
 use crate::grid::{Block, Point, Quantity};
-use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
 use crate::protocol::{SolverStats, error};
 
@@ -77,12 +76,17 @@ fn has_uncapped(block: &Block) -> bool {
 }
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let members = MemberCache::default();
+    // The members of families without a friction ceiling, each solved once for all ceilings.
+    let members = Memo::<(u64, usize), Solution>::default();
     rows::each(job, range, 16, buffer, FIELDS, |tuple, point| {
         let mut work = RunStats::default();
         let mut row =
             Row { member: None, obstacle: None, alpha_unit: 1.0, work_error: f64::NAN, least: Comparison::NONE };
-        let member = match members.get(job, tuple, point, &mut work) {
+        let number = point[Quantity::Family] as usize;
+        let Some(&family) = FAMILIES.get(number) else { return (Obstacle::Domain.status(), Some(row), work) };
+        let mut solve = || solve(job, family, point, &mut work);
+        let solved = if family.uses_tau_ceiling { solve() } else { members.get((tuple, number), solve) };
+        let member = match solved {
             Ok((member, work_error)) => {
                 row.work_error = work_error;
                 member
@@ -95,13 +99,15 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut status = member.status();
         if needs_optimum(job.projection) {
             let bounded = job.projection.has(GAP_ERROR);
-            let bounds = bounds(job, point);
+            let free = without_ceilings(job);
+            // The members of the family obey its own friction ceiling, or none.
+            let is_capped = family.uses_tau_ceiling;
+            let bounds = if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free };
             let works = (member.work, row.work_error);
             row.least = optimum_cache::compare(job, (tuple, point), &bounds, works, bounded, &mut work);
             status = status.compared_with(row.least.optimum);
         }
-        let family = FAMILIES.get(point[Quantity::Family] as usize);
-        if family.is_some_and(|family| family.name == "bounded_velocity") {
+        if family.name == "bounded_velocity" {
             row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
         }
         row.member = Some(member);
@@ -109,32 +115,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
     })
 }
 
-/// The bounds of the optimum with which the member of a family is compared: its own friction ceiling, or none.
-fn bounds(job: &Job<'_>, point: &Point) -> Bounds {
-    let free = without_ceilings(job);
-    let family = FAMILIES.get(point[Quantity::Family] as usize);
-    let is_capped = family.is_some_and(|family| family.uses_tau_ceiling);
-    if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free }
-}
-
 /// A member, and the error bound of its work if requested.
 type Solution = Result<(Member, f64), Obstacle>;
-
-/// The members of families without a friction ceiling, by tuple and family. Each is solved once for all ceilings.
-#[derive(Default)]
-struct MemberCache(Memo<(u64, usize), Solution>);
-
-impl MemberCache {
-    /// The member for `point`, of tuple number `tuple`; adds the statistics of this call.
-    fn get(&self, job: &Job<'_>, tuple: u64, point: &Point, work: &mut RunStats) -> Solution {
-        let number = point[Quantity::Family] as usize;
-        let Some(&family) = FAMILIES.get(number) else { return Err(Obstacle::Domain) };
-        if family.uses_tau_ceiling {
-            return solve(job, family, point, work);
-        }
-        self.0.get((tuple, number), || solve(job, family, point, work))
-    }
-}
 
 fn solve(job: &Job<'_>, family: &Family, point: &Point, work: &mut RunStats) -> Solution {
     let case = Case {

@@ -139,7 +139,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
 
 /// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration.
 fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
-    let has_points = spec.points.is_some() || spec.block.iter().any(|block| block.points.is_some());
+    let has_points = spec.blocks().any(|(_, block)| block.points.is_some());
     // Only the parts contain the points of a file.
     let headings = match folder.parts_there(table).first() {
         Some(&part) if has_points => {

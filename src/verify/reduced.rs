@@ -117,27 +117,20 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ch
 
 /// The landscape of a row alone: its transition and time, and the coefficients of the sweep.
 fn landscape(written: &Row, spec: &Spec) -> Option<Sweep> {
-    let block = match spec.block.as_slice() {
-        [] => spec.top(),
-        [block] => block.clone(),
-        _ => return None,
-    };
+    let mut blocks = spec.blocks();
+    let (Some((_, block)), None) = (blocks.next(), blocks.next()) else { return None };
     let mut axes = IndexMap::new();
     for axis in OPTIMUM_AXES {
         let value = AxisValue::Number(number(written, axis.name())?);
         axes.insert(axis.name().to_owned(), AxisSpec::One(value));
     }
-    let BlockSpec { axes: all, .. } = block;
     let coefficients = [Quantity::Alpha2, Quantity::Alpha3].map(Quantity::name);
-    axes.extend(all.into_iter().filter(|(name, _)| coefficients.contains(&name.as_str())));
+    axes.extend(block.axes.clone().into_iter().filter(|(name, _)| coefficients.contains(&name.as_str())));
     let rtol = spec.tables.get("gap").and_then(|table| table.rtol);
     let gap = TableSpec { rtol, ..TableSpec::default() };
     let alone = Spec {
-        axes,
+        top: BlockSpec { axes, ..BlockSpec::default() },
         tables: [("gap".to_owned(), gap)].into_iter().collect(),
-        points: None,
-        zip: Vec::new(),
-        condition: None,
         block: Vec::new(),
         ..spec.clone()
     };

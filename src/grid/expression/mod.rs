@@ -4,4 +4,4 @@ mod parse;
 mod program;
 
 pub use parse::Fault;
-pub use program::{Columns, Expression, Stack};
+pub use program::{Expression, Scratch};

@@ -61,22 +61,25 @@ pub struct Expression {
     pub(super) program: Vec<Op>,
 }
 
-/// Columns of quantities, and of word indices of labels.
-#[derive(Debug, Clone, Default)]
-pub struct Columns {
-    values: [Vec<f64>; Quantity::ALL.len()],
+/// The scratch memory of one thread: the values of quantities and labels at some points, and the stack of an evaluation.
+#[derive(Default)]
+pub struct Scratch {
+    /// Number of points.
+    pub length: usize,
+    quantities: [Vec<f64>; Quantity::ALL.len()],
     labels: Vec<Vec<f64>>,
+    stack: Vec<Vec<f64>>,
 }
 
-impl Columns {
+impl Scratch {
     /// The values of `quantity`.
-    pub fn get(&self, quantity: Quantity) -> &[f64] {
-        &self.values[quantity as usize]
+    pub fn column(&self, quantity: Quantity) -> &[f64] {
+        &self.quantities[quantity as usize]
     }
 
     /// The values of `quantity`, for writing.
-    pub fn get_mut(&mut self, quantity: Quantity) -> &mut Vec<f64> {
-        &mut self.values[quantity as usize]
+    pub fn column_mut(&mut self, quantity: Quantity) -> &mut Vec<f64> {
+        &mut self.quantities[quantity as usize]
     }
 
     /// The word indices of a label, for writing.
@@ -87,10 +90,6 @@ impl Columns {
         &mut self.labels[label]
     }
 }
-
-/// Reusable scratch memory of an evaluation.
-#[derive(Debug, Clone, Default)]
-pub struct Stack(Vec<Vec<f64>>);
 
 impl Expression {
     /// The distinct quantities that it names, or that vary with its labels.
@@ -114,9 +113,9 @@ impl Expression {
         })
     }
 
-    /// Its values at the `length` points of `columns`.
-    pub fn evaluate<'s>(&self, columns: &Columns, length: usize, stack: &'s mut Stack) -> &'s [f64] {
-        let stack = &mut stack.0;
+    /// Its values at the points of `scratch`.
+    pub fn evaluate<'s>(&self, scratch: &'s mut Scratch) -> &'s [f64] {
+        let Scratch { length, quantities, labels, stack } = scratch;
         let mut top = 0;
         for op in &self.program {
             if matches!(op, Op::Axis(_) | Op::Label { .. } | Op::Number(_)) {
@@ -127,12 +126,12 @@ impl Expression {
                 top += 1;
             }
             match *op {
-                Op::Axis(quantity) => stack[top - 1].extend_from_slice(columns.get(quantity)),
+                Op::Axis(quantity) => stack[top - 1].extend_from_slice(&quantities[quantity as usize]),
                 Op::Label { label, .. } => {
-                    let column = columns.labels.get(label).map_or(&[][..], Vec::as_slice);
+                    let column = labels.get(label).map_or(&[][..], Vec::as_slice);
                     stack[top - 1].extend_from_slice(column);
                 }
-                Op::Number(number) => stack[top - 1].resize(length, number),
+                Op::Number(number) => stack[top - 1].resize(*length, number),
                 Op::Unary(function) => unary(function, &mut stack[top - 1]),
                 Op::Binary(function) => {
                     let (left, right) = stack.split_at_mut(top - 1);
