@@ -117,7 +117,7 @@ pub(super) fn ln_ratio(v: f64, above: f64, v_f: f64) -> f64 {
 /// An arc on a ceiling, along which theta goes one way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CeilingArc {
-    ceilings: Ceilings,
+    pub ceilings: Ceilings,
     pub kind: ArcKind,
     /// Contact lifetime at the end of greater theta.
     pub theta_hi: f64,
@@ -242,7 +242,7 @@ impl CeilingArc {
             sums.state += v * ln_theta * dt;
             sums.nodes += 1;
             // Positive: gap and u - 1 differ in sign on both kinds of arc.
-            let price = -gap.value(depth) / excess * if of_v { 1.0 } else { v / a } * dt;
+            let price = -gap.value(self, depth) / excess * if of_v { 1.0 } else { v / a } * dt;
             sums.price += price;
             sums.price_ln_v += price * ln_v;
             sums.price_ln_theta += price * ln_theta;
@@ -275,7 +275,7 @@ impl CeilingArc {
     }
 
     /// The parts before and after a place, from 0 at the start to 1 at the end.
-    pub fn cut(&self, ceilings: &Ceilings, place: f64) -> [CeilingArc; 2] {
+    pub fn cut(&self, place: f64) -> [CeilingArc; 2] {
         let from_high = if self.falls() { place } else { 1.0 - place };
         let (high, change) = self.coordinates();
         let rise = self.rise();
@@ -299,8 +299,8 @@ impl CeilingArc {
         };
         let ln_z = if at < ln(LINEAR_LN_U) && !even { at } else { ln(z.abs()) };
         let mut parts = [
-            ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
-            ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
+            self.ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
+            self.ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
         ];
         // The end nearer to u = 1 keeps its logarithm.
         let high_first = self.z_hi.abs() <= self.z_lo.abs();

@@ -5,11 +5,11 @@
 
 use std::cell::Cell;
 
-use super::ArcKind;
-use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope};
+use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
 use super::ceiling::{CeilingArc, Ceilings};
 use super::extremal::{Extremal, FreeSums, Problem};
 use super::lifetime::Lifetime;
+use super::{ArcKind, floor};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 
@@ -171,10 +171,6 @@ pub(super) enum ClampedPiece {
 /// nothing cancels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gap {
-    a: f64,
-    b: f64,
-    /// `d ln u/d ln theta`.
-    rise: f64,
     /// Whether it counts from the end of greater theta, or from the other.
     from_high: bool,
     /// The value, `u` and `C theta` there.
@@ -211,12 +207,11 @@ impl Gap {
         self.pull * exp(self.way(depth))
     }
 
-    /// The value.
-    pub fn value(&self, depth: Depth) -> f64 {
-        let y = self.way(depth);
-        let of_v = self.rise == 1.0;
-        let (grown, bend) = if of_v { (exp_m1(y), self.b * y) } else { (exp_m1(self.rise * y), 0.0) };
-        self.value + self.a * self.u * grown - self.pull * exp_m1(y) - bend
+    /// The value at a place on `arc`.
+    pub fn value(&self, arc: &CeilingArc, depth: Depth) -> f64 {
+        let (Law { a, b }, rise, y) = (arc.ceilings.law, arc.rise(), self.way(depth));
+        let (grown, bend) = if rise == 1.0 { (exp_m1(y), b * y) } else { (exp_m1(rise * y), 0.0) };
+        self.value + a * self.u * grown - self.pull * exp_m1(y) - bend
     }
 }
 
@@ -225,7 +220,6 @@ impl Gap {
 pub(super) struct Path {
     pub extremal: Extremal,
     pieces: [Option<ClampedPiece>; Path::MAX_PIECES],
-    count: usize,
     /// Times on the ceilings of the velocity and of friction.
     pub times: (f64, f64),
     /// Derivative of the time with respect to the parameter where quadratures do not resolve it.
@@ -258,7 +252,7 @@ impl Path {
 
     /// A path without pieces.
     fn new(extremal: Extremal) -> Path {
-        Path { extremal, pieces: [None; Path::MAX_PIECES], count: 0, times: (0.0, 0.0), rate: None }
+        Path { extremal, pieces: [None; Path::MAX_PIECES], times: (0.0, 0.0), rate: None }
     }
 
     /// The pieces in their order.
@@ -271,9 +265,8 @@ impl Path {
             let time = if arc.kind == ArcKind::VCeiling { &mut self.times.0 } else { &mut self.times.1 };
             *time += arc.time();
         }
-        if self.count < self.pieces.len() {
-            self.pieces[self.count] = Some(piece);
-            self.count += 1;
+        if let Some(room) = self.pieces.iter_mut().find(|room| room.is_none()) {
+            *room = Some(piece);
         }
     }
 
@@ -336,9 +329,10 @@ impl Path {
         let mut known = [false; Path::MAX_PIECES];
         for at_end in [false, true] {
             let mut neighbour: Option<Option<f64>> = None;
-            for step in 0..self.count {
-                let i = if at_end { self.count - 1 - step } else { step };
-                let Some(ClampedPiece::Ceiling { arc, gap }) = &mut self.pieces[i] else {
+            for step in 0..Path::MAX_PIECES {
+                let i = if at_end { Path::MAX_PIECES - 1 - step } else { step };
+                let Some(piece) = &mut self.pieces[i] else { continue };
+                let ClampedPiece::Ceiling { arc, gap } = piece else {
                     neighbour = Some(Some(0.0));
                     continue;
                 };
@@ -347,7 +341,7 @@ impl Path {
                     gap.refer(arc, near_high, value);
                     known[i] = true;
                 }
-                neighbour = Some(known[i].then(|| gap.value(far)));
+                neighbour = Some(known[i].then(|| gap.value(arc, far)));
             }
         }
     }
@@ -376,42 +370,21 @@ impl Path {
         (found.time.is_finite() && found.work.is_finite()).then_some(found)
     }
 
-    /// Work on the ceilings, and the nodes that it takes.
-    pub fn ceiling_work(&self) -> (f64, u32) {
-        self.pieces().fold((0.0, 0), |(work, nodes), piece| match piece {
-            ClampedPiece::Free { .. } => (work, nodes),
-            ClampedPiece::Ceiling { arc, .. } => {
-                let (of_arc, spent) = arc.work();
-                (work + of_arc, nodes + spent)
-            }
-        })
-    }
-
     /// The path for reading.
     pub fn view(&self) -> PathView<'_> {
-        PathView { extremal: &self.extremal, pieces: &self.pieces, times: self.times }
+        PathView { extremal: &self.extremal, whole: None, pieces: &self.pieces, times: self.times }
     }
 }
 
-/// A path that is borrowed: a free extremal needs no room for five pieces.
+/// A path for reading: a free extremal needs no room for five pieces.
 pub(super) struct PathView<'a> {
     pub extremal: &'a Extremal,
+    /// A free extremal as one piece.
+    whole: Option<ClampedPiece>,
+    /// The pieces of a clamped one.
     pieces: &'a [Option<ClampedPiece>],
     /// Times on the ceilings of the velocity and of friction.
     pub times: (f64, f64),
-}
-
-impl PathView<'_> {
-    /// Reads a free extremal.
-    #[inline(always)]
-    pub fn of_free<T>(problem: &Problem, extremal: &Extremal, read: impl FnOnce(&PathView) -> T) -> T {
-        read(&PathView { extremal, pieces: &[Some(whole(problem, extremal))], times: (0.0, 0.0) })
-    }
-
-    /// The pieces in their order.
-    pub fn pieces(&self) -> impl Iterator<Item = &ClampedPiece> {
-        self.pieces.iter().flatten()
-    }
 }
 
 /// Friction along a path.
@@ -422,7 +395,31 @@ pub(super) struct FrictionRange {
     pub greatest: f64,
 }
 
-impl PathView<'_> {
+impl<'a> PathView<'a> {
+    /// A free extremal.
+    #[inline(always)]
+    pub fn of_free(problem: &Problem, extremal: &'a Extremal) -> PathView<'a> {
+        PathView { extremal, whole: Some(whole(problem, extremal)), pieces: &[], times: (0.0, 0.0) }
+    }
+
+    /// The pieces in their order.
+    pub fn pieces(&self) -> impl Iterator<Item = &ClampedPiece> {
+        self.whole.iter().chain(self.pieces.iter().flatten())
+    }
+
+    /// Work at the floor and on the ceilings, and the nodes that it takes.
+    pub fn bound_work(&self, problem: &Problem) -> (f64, u32) {
+        let (mut work, mut nodes) = (0.0, 0);
+        for piece in self.pieces() {
+            if let ClampedPiece::Ceiling { arc, .. } = piece {
+                let (of_arc, spent) = arc.work();
+                work += of_arc;
+                nodes += spent;
+            }
+        }
+        (work + floor::work(&problem.law, problem.from, self.extremal.time_at_floor), nodes)
+    }
+
     /// Friction along the pieces and at the floor; `met` is the least at nodes.
     #[inline(always)]
     pub fn friction(&self, problem: &Problem, met: f64) -> FrictionRange {
@@ -432,7 +429,7 @@ impl PathView<'_> {
         let mut range = FrictionRange { least, least_steady: f64::INFINITY, greatest: f64::NEG_INFINITY };
         for piece in self.pieces() {
             let ends = piece.ends();
-            let steady = |end: &ArcPoint| 1.0 + (law.b - law.a) * end.ln_theta;
+            let steady = |end: &ArcPoint| steady_friction(law, end.ln_theta);
             let at = |end: &ArcPoint| steady(end) + law.a * end.ln_u;
             let [low, high] = match piece.kind() {
                 ArcKind::Free => friction_range(law, c, &ends),
@@ -450,6 +447,18 @@ impl PathView<'_> {
 }
 
 impl ClampedPiece {
+    /// An arc on a ceiling with `G` from its `value` at the end of greater theta, where `C theta` is `pull`.
+    fn on_ceiling(arc: CeilingArc, pull: f64, value: f64) -> ClampedPiece {
+        ClampedPiece::Ceiling { arc, gap: Gap { from_high: true, value, u: exp(arc.z_hi), pull } }
+    }
+
+    pub fn kind(&self) -> ArcKind {
+        match self {
+            ClampedPiece::Free { .. } => ArcKind::Free,
+            ClampedPiece::Ceiling { arc, .. } => arc.kind,
+        }
+    }
+
     /// The start and the end.
     #[inline(always)]
     pub fn ends(&self) -> [ArcPoint; 2] {
@@ -481,7 +490,7 @@ pub(super) fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Ex
         theta_top,
         ln_theta_top,
         excess,
-        friction: 1.0 + (law.b - law.a) * ln_theta_top,
+        friction: steady_friction(&law, ln_theta_top),
         depth,
         z_v: ceilings.cap_of(ArcKind::VCeiling, depth),
         z_tau: ceilings.cap_of(ArcKind::TauCeiling, depth),
@@ -528,9 +537,8 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
         }
     };
     let switch = |d: f64| {
-        let kind = binding(fall, d);
-        let z = fall.cap(kind, d);
-        ArcPoint { theta: fall.theta_top * exp(-d), ln_theta: fall.ln_theta_top - d, ln_u: z }
+        let ln_u = fall.cap(ArcKind::VCeiling, d).min(fall.cap(ArcKind::TauCeiling, d));
+        ArcPoint { theta: fall.theta_top * exp(-d), ln_theta: fall.ln_theta_top - d, ln_u }
     };
     let [start, end] = ends_of(problem, extremal);
     let (start, end) = (if first { start } else { switch(from) }, if last { end } else { switch(to) });
@@ -540,12 +548,6 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
     ClampedPiece::Free { arc: Arc { law, chart }, turned, at: [first, last], ends: [start, end] }
 }
 
-/// The lower ceiling.
-fn binding(fall: &Fall, d: f64) -> ArcKind {
-    let of_v = fall.cap(ArcKind::VCeiling, d) < fall.cap(ArcKind::TauCeiling, d);
-    if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling }
-}
-
 /// An arc on a ceiling, with `G` from its end of greater theta.
 fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, [from, to]: [f64; 2], value: f64) -> ClampedPiece {
     let theta_hi = fall.theta_top * exp(-from);
@@ -553,23 +555,7 @@ fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, [from, to]: [f6
     let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
     let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
     let pull = (fall.excess - fall.friction) * exp(-from);
-    let gap = gap_of(fall.law, &arc, pull, value);
-    ClampedPiece::Ceiling { arc, gap }
-}
-
-/// `G` of an arc from its `value` at the end of greater theta, where `C theta` is `pull`.
-fn gap_of(law: Law, arc: &CeilingArc, pull: f64, value: f64) -> Gap {
-    let rise = arc.rise();
-    Gap { a: law.a, b: law.b, rise, from_high: true, value, u: exp(arc.z_hi), pull }
-}
-
-impl ClampedPiece {
-    pub fn kind(&self) -> ArcKind {
-        match self {
-            ClampedPiece::Free { .. } => ArcKind::Free,
-            ClampedPiece::Ceiling { arc, .. } => arc.kind,
-        }
-    }
+    ClampedPiece::on_ceiling(arc, pull, value)
 }
 
 impl Path {
@@ -614,8 +600,7 @@ impl Path {
         let mut path = Path::of(&sub, extremal);
         let pull = c * theta.theta;
         let mut add = |arc: CeilingArc| {
-            let gap = gap_of(law, &arc, pull * (arc.theta_hi / theta.theta), 0.0);
-            path.push(ClampedPiece::Ceiling { arc, gap });
+            path.push(ClampedPiece::on_ceiling(arc, pull * (arc.theta_hi / theta.theta), 0.0));
         };
         if let Some(ln_z) = ln_z {
             let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);

@@ -211,7 +211,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol:
 }
 
 const INFEASIBLE: Solved<Optimum> =
-    Solved { status: Status::Infeasible, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
+    Solved::without_numbers(Status::Infeasible, SolverStats { quadratures: 0, nodes: 0 });
 
 /// The optimal protocol and the derivatives of its work; `None` at the least time of a deceleration.
 ///
@@ -270,7 +270,7 @@ fn motion_of(
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
     let found = constrained::find(problem, ceilings, Time::since(problem, t_f), rtol.min(MOTION_RTOL));
-    let motion = found.solved.value.map(|_| OptimalMotion::new(problem, ceilings, t_f, &found));
+    let motion = found.solved.value.map(|_| OptimalMotion::new(problem, t_f, &found));
     (found.solved, motion.map(|motion| Box::new(motion) as Box<dyn Motion>))
 }
 

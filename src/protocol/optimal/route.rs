@@ -97,12 +97,11 @@ impl Route {
         };
         let Law { a, b } = self.law;
         let here = arc.pieces.at(place);
-        let theta = here.theta;
+        let (theta, friction) = (here.theta, here.friction(&self.law));
         let v = exp(here.ln_u - here.ln_theta);
         let rate = -exp_m1(here.ln_u);
         // Derivatives of ln v = q, ln theta = y and friction, from q' = (tau + a - b)/(a theta) and theta' = 1 - theta
         // v.
-        let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
         let y1 = rate / theta;
         let q1 = (friction + a - b) / (a * theta);
         let y2 = -(y1 / theta + v * q1);
@@ -144,7 +143,7 @@ impl Route {
             if let PathPoint::Held(_) = from {
                 sites.push(PathPoint::Moving(0.0));
             }
-            sites.extend(arc.parts(start, end).map(|(_, to)| PathPoint::Moving(to)));
+            sites.extend(arc.parts(start, end).map(|[_, to]| PathPoint::Moving(to)));
         }
         sites
     }
@@ -176,7 +175,7 @@ impl Route {
         }
         if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
             let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            for (from, to) in arc.parts(start, end) {
+            for [from, to] in arc.parts(start, end) {
                 let sums = arc.pieces.sums(from, to);
                 span.time += sums.time;
                 span.lag += sums.lag;
@@ -204,7 +203,7 @@ impl Route {
         let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) else { return };
         let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
         let moment_at = |place| moment(&self.jet(PathPoint::Moving(place)));
-        for (from, to) in arc.parts(start, end) {
+        for [from, to] in arc.parts(start, end) {
             let mut before = (from, moment_at(from));
             extent.add(before.1[0]);
             for u in radau().u {
@@ -225,27 +224,21 @@ impl Route {
 
 impl Timed {
     /// The parts of `[from, to]` that lie in one piece each.
-    fn parts(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + use<'_> {
-        let count = f64::from(self.pieces.count);
-        let edge = move |piece: u32| f64::from(piece) / count;
-        (0..self.pieces.count)
-            .map(move |piece| (edge(piece).max(from), edge(piece + 1).min(to)))
-            .filter(|(from, to)| from < to)
+    fn parts(&self, from: f64, to: f64) -> impl Iterator<Item = [f64; 2]> {
+        self.pieces.edges().map(move |[first, last]| [first.max(from), last.min(to)]).filter(|[from, to]| from < to)
     }
 
     /// The place at a time after the start of the arc.
     fn place_after(&self, time: f64) -> f64 {
         let piece = self.gone.partition_point(|&gone| gone <= time).clamp(1, self.gone.len() - 1) - 1;
-        let count = f64::from(self.pieces.count);
-        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        let [from, to] = self.pieces.edges_of(piece);
         from + inverse(time - self.gone[piece], to - from, |d| self.pieces.time(from, from + d))
     }
 
     /// The place at a time before the end of the arc.
     fn place_before(&self, time: f64) -> f64 {
         let piece = self.left.partition_point(|&left| left > time).clamp(1, self.left.len() - 1) - 1;
-        let count = f64::from(self.pieces.count);
-        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        let [from, to] = self.pieces.edges_of(piece);
         to - inverse(time - self.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
     }
 }
