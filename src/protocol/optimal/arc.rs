@@ -97,7 +97,7 @@ impl Default for Sums {
 }
 
 impl Sums {
-    fn add(&mut self, other: &Sums) {
+    pub fn add(&mut self, other: &Sums) {
         self.time += other.time;
         self.lag += other.lag;
         self.work += other.work;

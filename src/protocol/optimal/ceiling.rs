@@ -150,14 +150,6 @@ pub(super) struct CeilingSums {
     pub nodes: u32,
 }
 
-/// Place and weight of a node on a ceiling.
-struct CeilingNode {
-    depth: Depth,
-    z: f64,
-    /// Its weight in time.
-    dt: f64,
-}
-
 impl CeilingArc {
     /// Whether theta falls along it.
     pub fn falls(&self) -> bool {
@@ -212,41 +204,35 @@ impl CeilingArc {
         ln_1p(u * exp_m1(self.length) / x)
     }
 
-    /// Visits the nodes of the arc; returns the time without nodes.
-    fn visit(&self, mut node: impl FnMut(&CeilingNode)) -> f64 {
-        let line = CeilingLine::of(self);
-        for chart in line.charts(self) {
-            chart.nodes(|at, weight| {
-                let (s, size, scale) = line.place(chart.near, at);
-                let (near, far) = (s, self.length - s);
-                let (below, above) = if line.high_first { (near, far) } else { (far, near) };
-                let (depth, z) = (Depth { below, above }, line.sign * size);
-                node(&CeilingNode { depth, z, dt: self.theta_hi * exp(-below) * weight * scale / exp_m1(z).abs() });
-            });
-        }
-        line.lingered
-    }
-
     /// Parts of the work, and the prices.
     pub fn sums(&self, gap: &Gap) -> CeilingSums {
         let ln_theta_hi = ln(self.theta_hi);
         let Law { a, b } = self.ceilings.law;
         let mut sums = CeilingSums::default();
         let of_v = self.kind == ArcKind::VCeiling;
-        let lingered = self.visit(|&CeilingNode { depth, z, dt }| {
-            let ln_theta = ln_theta_hi - depth.below;
-            let (u, excess) = exp_and_m1(z);
-            let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
-            let ln_v = z - ln_theta;
-            sums.creep += v * ln_v * dt;
-            sums.state += v * ln_theta * dt;
-            sums.nodes += 1;
-            // Positive: gap and u - 1 differ in sign on both kinds of arc.
-            let price = -gap.value(self, depth) / excess * if of_v { 1.0 } else { v / a } * dt;
-            sums.price += price;
-            sums.price_ln_v += price * ln_v;
-            sums.price_ln_theta += price * ln_theta;
-        });
+        let line = CeilingLine::of(self);
+        for chart in line.charts(self) {
+            chart.nodes(|at, weight| {
+                let (s, size, scale) = line.place(chart.near, at);
+                let (near, far) = (s, self.length - s);
+                let (below, above) = if line.high_first { (near, far) } else { (far, near) };
+                let (z, ln_theta) = (line.sign * size, ln_theta_hi - below);
+                let (u, excess) = exp_and_m1(z);
+                let dt = self.theta_hi * exp(-below) * weight * scale / exp_m1(z).abs();
+                let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
+                let ln_v = z - ln_theta;
+                sums.creep += v * ln_v * dt;
+                sums.state += v * ln_theta * dt;
+                sums.nodes += 1;
+                // Positive: gap and u - 1 differ in sign on both kinds of arc.
+                let gap = gap.value(self, Depth { below, above });
+                let price = -gap / excess * if of_v { 1.0 } else { v / a } * dt;
+                sums.price += price;
+                sums.price_ln_v += price * ln_v;
+                sums.price_ln_theta += price * ln_theta;
+            });
+        }
+        let lingered = line.lingered;
         if lingered > 0.0 {
             // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
             let depth = self.end(self.z_hi.abs() <= self.z_lo.abs());

@@ -7,7 +7,7 @@ use std::cell::Cell;
 
 use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
 use super::ceiling::{CeilingArc, Ceilings};
-use super::extremal::{Extremal, FreeSums, Problem};
+use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use super::{ArcKind, floor};
 use crate::model::Law;
@@ -226,19 +226,6 @@ pub(super) struct Path {
     rate: Option<f64>,
 }
 
-/// What a quadrature along a path finds.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PathSums {
-    /// Time at the floor and all pieces.
-    pub time: f64,
-    /// Of the free pieces.
-    pub work: f64,
-    /// Derivative of the time with respect to the parameter of the family.
-    pub rate: f64,
-    pub friction_min: f64,
-    pub nodes: u32,
-}
-
 impl Path {
     /// Most pieces. Derived: friction, free, friction, free, velocity.
     const MAX_PIECES: usize = 5;
@@ -346,28 +333,20 @@ impl Path {
         }
     }
 
-    /// Quadrature of all pieces to relative accuracy `tolerance`.
-    pub fn sums(&self, tolerance: f64) -> Option<PathSums> {
-        let mut found =
-            PathSums { time: self.extremal.time_at_floor, work: 0.0, rate: 0.0, friction_min: f64::INFINITY, nodes: 0 };
-        let mut free = FreeSums::default();
+    /// Quadrature of the free pieces to relative accuracy `tolerance`, but with the whole time, also at the floor and on the ceilings;
+    /// and the derivative of that time with respect to the parameter of the family.
+    pub fn sums(&self, tolerance: f64) -> Option<(Sums, f64)> {
+        let mut sums = Sums { time: self.extremal.time_at_floor, ..Sums::default() };
+        let (mut ends, mut has) = (0.0, [false; 2]);
         for piece in self.pieces() {
             let ClampedPiece::Free { arc, turned, at, .. } = piece else { continue };
-            let Sums { time, work, sensitivity, swing, friction_min, nodes, .. } = arc.sums::<false>(tolerance)?;
-            found.time += time;
-            found.work += work;
-            found.friction_min = found.friction_min.min(friction_min);
-            found.nodes += nodes;
-            free.sensitivity += sensitivity;
-            free.ends += turned;
-            free.at_start |= at[0];
-            free.at_end |= at[1];
-            free.swing += swing;
+            sums.add(&arc.sums::<false>(tolerance)?);
+            ends += turned;
+            has = [has[0] || at[0], has[1] || at[1]];
         }
-        found.time += self.times.0 + self.times.1;
-        let rate = self.extremal.rate_of(&free);
-        found.rate = self.rate.unwrap_or(rate);
-        (found.time.is_finite() && found.work.is_finite()).then_some(found)
+        sums.time += self.times.0 + self.times.1;
+        let rate = self.rate.unwrap_or_else(|| self.extremal.rate_of(&sums, ends, has));
+        (sums.time.is_finite() && sums.work.is_finite()).then_some((sums, rate))
     }
 
     /// The path for reading.
@@ -671,25 +650,26 @@ mod tests {
                             let at = |q: f64| {
                                 let extremal = problem.extremal(q, q_floor)?;
                                 let path = Path::clamped(&problem, &ceilings, extremal, &Switches::unknown())?;
-                                Some((path.sums(1e-14)?, path.signature()))
+                                let (sums, rate) = path.sums(1e-14)?;
+                                Some(([sums.time, rate], path.signature()))
                             };
                             let (Some(before), Some(here), Some(after)) = (at(q - step), at(q), at(q + step)) else {
                                 continue;
                             };
                             let clamps = times.min(above) < f64::INFINITY;
-                            if before.1 != after.1 || (clamps && here.1 < 4) || here.0.time < 1e-9 {
+                            if before.1 != after.1 || (clamps && here.1 < 4) || here.0[0] < 1e-9 {
                                 continue;
                             }
                             if q.abs() < 2.0 * step || q_floor.is_some_and(|h| (q + h).abs() < 2.0 * step) {
                                 continue;
                             }
-                            let difference = (after.0.time - before.0.time) / (2.0 * step);
-                            let error = (difference - here.0.rate).abs() / here.0.rate.abs().max(1e-3 * here.0.time);
+                            let difference = (after.0[0] - before.0[0]) / (2.0 * step);
+                            let [time, rate] = here.0;
+                            let error = (difference - rate).abs() / rate.abs().max(1e-3 * time);
                             seen += 1;
                             assert!(
                                 error <= if clamps { 1e-4 } else { 1e-5 },
-                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {} difference {difference}",
-                                here.0.rate
+                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {rate} difference {difference}"
                             );
                         }
                     }

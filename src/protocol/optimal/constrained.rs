@@ -1,9 +1,9 @@
 //! The optimum under ceilings: the free one where it obeys them, else the clamped extremal of the same family that takes
 //! the given time.
 
-use super::arc::phi;
+use super::arc::{Sums, phi};
 use super::ceiling::Ceilings;
-use super::clamp::{Path, PathSums, PathView, Switch, Switches, falling_part};
+use super::clamp::{Path, PathView, Switch, Switches, falling_part};
 use super::extremal::{MAX_LN_U, Problem};
 use super::guess::{Guess, QUADRATURE_ERROR, capped_guess};
 use super::lifetime::Lifetime;
@@ -276,7 +276,7 @@ impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
     /// The value is the logarithm of the ratio of what the times have beyond the least, and of what they leave to the greatest.
     fn measure(&self, path: &Path, tolerance: f64) -> Option<Measured> {
         let &ClampedPaths { t_f, least, most, .. } = self;
-        let PathSums { time, work, rate, friction_min, nodes } = path.sums(tolerance)?;
+        let (Sums { time, work, friction_min, nodes, .. }, rate) = path.sums(tolerance)?;
         let sign = if self.rises { 1.0 } else { -1.0 };
         let probe = if time <= least {
             Probe { value: -sign * f64::MAX, slope: 0.0 }
@@ -359,7 +359,7 @@ impl Search<'_> {
         };
         let tolerance = search::quadrature_tolerance(self.rtol);
         let nearest = member(ln(far)).and_then(|path| path.sums(tolerance));
-        if nearest.is_none_or(|sums| sums.time >= self.t_f) {
+        if nearest.is_none_or(|(sums, _)| sums.time >= self.t_f) {
             return None;
         }
         let bracket = (f64::NEG_INFINITY, ln(far));

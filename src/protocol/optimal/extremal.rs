@@ -73,20 +73,6 @@ enum Rate {
     OneWay { gain: f64 },
 }
 
-/// Sums over all free pieces.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct FreeSums {
-    /// Of the sensitivity of the chart.
-    pub sensitivity: f64,
-    /// Of `theta/(u - 1)` at their ends less that at their starts, and of [`Extremal::end_terms`].
-    pub ends: f64,
-    /// Of the swing.
-    pub swing: f64,
-    /// Whether the start and the end of the extremal are among them.
-    pub at_start: bool,
-    pub at_end: bool,
-}
-
 /// What an extremal does before its arc, with the fields of [`Extremal`].
 struct Leaving {
     time_at_floor: f64,
@@ -479,18 +465,21 @@ impl Extremal {
         }
     }
 
-    /// Derivative of the total time with respect to the parameter.
+    /// Derivative of the total time with respect to the parameter, from the `sums` over all free pieces, and over their `ends` of
+    /// `theta/(u - 1)`, that at the start of each less, and of [`Extremal::end_terms`]. The start and the end of the extremal are
+    /// among the pieces where `has` states so.
     #[inline(always)]
-    pub fn rate_of(&self, free: &FreeSums) -> f64 {
-        let inside = |gain: f64| gain * (free.sensitivity + free.ends);
+    pub fn rate_of(&self, sums: &Sums, ends: f64, has: [bool; 2]) -> f64 {
+        let &Sums { sensitivity, swing, .. } = sums;
+        let inside = |gain: f64| gain * (sensitivity + ends);
         match self.rate {
-            Rate::Turning { one_way, .. } if !free.at_start && one_way != 0.0 => one_way * free.swing,
+            Rate::Turning { one_way, .. } if !has[0] && one_way != 0.0 => one_way * swing,
             Rate::Floor { gain, outer, .. } | Rate::Turning { gain, outer, .. } => {
-                inside(gain) + if free.at_start { outer } else { 0.0 }
+                inside(gain) + if has[0] { outer } else { 0.0 }
             }
-            Rate::Ending { gain, outer, .. } => inside(gain) + if free.at_end { outer } else { 0.0 },
-            Rate::Direct { gain } => gain * free.sensitivity,
-            Rate::OneWay { gain } => gain * free.swing,
+            Rate::Ending { gain, outer, .. } => inside(gain) + if has[1] { outer } else { 0.0 },
+            Rate::Direct { gain } => gain * sensitivity,
+            Rate::OneWay { gain } => gain * swing,
         }
     }
 
@@ -499,8 +488,7 @@ impl Extremal {
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
         let [start, end] = self.end_terms();
-        let &Sums { sensitivity, swing, .. } = sums;
-        let rate = self.rate_of(&FreeSums { sensitivity, ends: start + end, swing, at_start: true, at_end: true });
+        let rate = self.rate_of(sums, start + end, [true; 2]);
         let (value, slope) = if let Rate::Floor { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {

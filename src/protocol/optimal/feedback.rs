@@ -26,11 +26,9 @@ pub fn feedback_at(
     bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> Solved<FeedbackPoint> {
-    let bounds = bounds.into();
-    let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else {
+    let Some((problem, ceilings)) = posed(law, theta, t_left, v_f, &bounds.into()) else {
         return Solved::without_numbers(Status::Infeasible, SolverStats::default());
     };
-    let ceilings = Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), &bounds);
     let Constrained { solved, path, sitting } =
         constrained::find(&problem, &ceilings, Time::since(&problem, t_left), rtol);
     let Solved { status, value, stats } = solved;
@@ -67,18 +65,18 @@ fn waiting_gain(problem: &Problem, path: &Path) -> Option<f64> {
     Some(-exp(z) / theta / excess * (friction - b + a) / (a * theta))
 }
 
-/// The problem from `theta` to steady sliding at `v_f`; `None` outside the domain.
-fn posed(law: Law, theta: f64, t_left: f64, v_f: f64, bounds: &Bounds) -> Option<Problem> {
+/// The problem from `theta` to steady sliding at `v_f`, and its ceilings; `None` outside the domain.
+fn posed(law: Law, theta: f64, t_left: f64, v_f: f64, bounds: &Bounds) -> Option<(Problem, Ceilings)> {
     let numbers = [law.a, law.b, theta, t_left, v_f].iter().all(|x| x.is_finite());
     let inside = law.a > 0.0 && law.b >= 0.0 && theta > 0.0 && t_left > 0.0 && v_f > 1.0;
     let young = theta < 1.0 || !bounds.floor;
-    (numbers && inside && young && bounds.is_valid()).then(|| Problem {
-        law,
-        from: Lifetime::with(theta, 1.0 - theta),
-        to: Lifetime::steady(v_f),
-        fall: (DoubleDouble::product(theta, v_f) + DoubleDouble::new(-1.0)).high,
-        bounded: bounds.floor,
-    })
+    if !(numbers && inside && young && bounds.is_valid()) {
+        return None;
+    }
+    let fall = (DoubleDouble::product(theta, v_f) + DoubleDouble::new(-1.0)).high;
+    let (from, to) = (Lifetime::with(theta, 1.0 - theta), Lifetime::steady(v_f));
+    let problem = Problem { law, from, to, fall, bounded: bounds.floor };
+    Some((problem, Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), bounds)))
 }
 
 /// The optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`, and its motion.
@@ -90,9 +88,8 @@ pub fn motion_from(
     bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
-    let bounds = bounds.into();
-    let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else { return (INFEASIBLE, None) };
-    super::motion_of(&problem, &Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), &bounds), t_left, rtol)
+    let Some((problem, ceilings)) = posed(law, theta, t_left, v_f, &bounds.into()) else { return (INFEASIBLE, None) };
+    super::motion_of(&problem, &ceilings, t_left, rtol)
 }
 
 /// The optimal feedback: velocity and multipliers.

@@ -31,7 +31,6 @@ pub struct PathSegment {
 
 /// The free optimal protocol: the floor arc, then the free arc.
 pub struct Route {
-    law: Law,
     t_f: f64,
     floor: Floor,
     arc: Option<Timed>,
@@ -49,7 +48,7 @@ impl Route {
             arc
         });
         let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.start));
-        Route { law: problem.law, t_f, floor, arc }
+        Route { t_f, floor, arc }
     }
 
     /// Duration `t_f`.
@@ -95,9 +94,10 @@ impl Route {
             (PathPoint::Moving(_), None) => return self.held(self.t_f),
             (PathPoint::Held(time), _) => return self.held(time),
         };
-        let Law { a, b } = self.law;
+        let law = &self.floor.law;
+        let &Law { a, b } = law;
         let here = arc.pieces.at(place);
-        let (theta, friction) = (here.theta, here.friction(&self.law));
+        let (theta, friction) = (here.theta, here.friction(law));
         let v = exp(here.ln_u - here.ln_theta);
         let rate = -exp_m1(here.ln_u);
         // Derivatives of ln v = q, ln theta = y and friction, from q' = (tau + a - b)/(a theta) and theta' = 1 - theta
@@ -126,11 +126,26 @@ impl Route {
         }
     }
 
+    /// Between two points: from which time to which on the floor arc, and from which place to which on the arc.
+    fn stretches(&self, from: PathPoint, to: PathPoint) -> (Option<[f64; 2]>, Option<(&Timed, [f64; 2])>) {
+        let held = match (from, to) {
+            (PathPoint::Held(start), PathPoint::Held(end)) => Some([start, end]),
+            (PathPoint::Held(start), PathPoint::Moving(_)) => Some([start, self.floor.time]),
+            (PathPoint::Moving(_), _) => None,
+        };
+        let places = match (from, to) {
+            (_, PathPoint::Held(_)) => None,
+            (PathPoint::Held(_), PathPoint::Moving(end)) => Some([0.0, end]),
+            (PathPoint::Moving(start), PathPoint::Moving(end)) => Some([start, end]),
+        };
+        (held, self.arc.as_ref().zip(places))
+    }
+
     /// Places between two, with them, between which the protocol is smooth and shows no detail much narrower.
     pub fn landmarks(&self, from: PathPoint, to: PathPoint) -> Vec<PathPoint> {
         let mut sites = vec![from];
-        if let PathPoint::Held(start) = from {
-            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
+        let (held, moving) = self.stretches(from, to);
+        if let Some([start, end]) = held {
             // Theta changes over its first value, and then over 1.
             let mut time = start;
             while time < end && sites.len() < MAX_MARKS {
@@ -138,9 +153,8 @@ impl Route {
                 sites.push(PathPoint::Held(time));
             }
         }
-        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            if let PathPoint::Held(_) = from {
+        if let Some((arc, [start, end])) = moving {
+            if held.is_some() {
                 sites.push(PathPoint::Moving(0.0));
             }
             sites.extend(arc.parts(start, end).map(|[_, to]| PathPoint::Moving(to)));
@@ -151,14 +165,13 @@ impl Route {
     /// Least friction between two places: at one of them, or in between if it falls below 0 there.
     pub fn friction_min(&self, from: PathPoint, to: PathPoint) -> f64 {
         let mut least = f64::INFINITY;
-        if let PathPoint::Held(start) = from {
+        let (law, (held, moving)) = (&self.floor.law, self.stretches(from, to));
+        if let Some([start, _]) = held {
             // It rises all the way.
-            least = 1.0 + self.law.b * self.floor.from.aged(start).ln;
+            least = 1.0 + law.b * self.floor.from.aged(start).ln;
         }
-        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            let (first, last) = (arc.pieces.at(start), arc.pieces.at(end));
-            least = least.min(friction_range(&self.law, arc.c, &[first, last])[0]);
+        if let Some((arc, ends)) = moving {
+            least = least.min(friction_range(law, arc.c, &ends.map(|place| arc.pieces.at(place)))[0]);
         }
         least
     }
@@ -166,15 +179,14 @@ impl Route {
     /// The work, time and slip from one point to a later one.
     pub fn span(&self, from: PathPoint, to: PathPoint) -> PathSegment {
         let mut span = PathSegment { time: 0.0, lag: 0.0, work: 0.0 };
-        if let PathPoint::Held(start) = from {
-            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
+        let (held, moving) = self.stretches(from, to);
+        if let Some([start, end]) = held {
             let (now, time) = (self.floor.from.aged(start), end - start);
             span.time += time;
             span.lag += lag_at_bound(now.theta, time);
-            span.work += floor::work(&self.law, now, time);
+            span.work += floor::work(&self.floor.law, now, time);
         }
-        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
+        if let Some((arc, [start, end])) = moving {
             for [from, to] in arc.parts(start, end) {
                 let sums = arc.pieces.sums(from, to);
                 span.time += sums.time;
@@ -194,14 +206,10 @@ impl Route {
         extent: &mut ValueRange,
         moment: impl Fn(&Jet) -> [f64; 2],
     ) {
-        if let PathPoint::Held(start) = from {
-            // v_c = 1 + (b/k) theta'/theta falls all the way, and v rests.
-            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
-            extent.add(moment(&self.held(start))[0]);
-            extent.add(moment(&self.held(end))[0]);
-        }
-        let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) else { return };
-        let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
+        let (held, moving) = self.stretches(from, to);
+        // v_c = 1 + (b/k) theta'/theta falls all the way, and v rests.
+        held.iter().flatten().for_each(|&time| extent.add(moment(&self.held(time))[0]));
+        let Some((arc, [start, end])) = moving else { return };
         let moment_at = |place| moment(&self.jet(PathPoint::Moving(place)));
         for [from, to] in arc.parts(start, end) {
             let mut before = (from, moment_at(from));
