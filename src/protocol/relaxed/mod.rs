@@ -71,28 +71,39 @@ const fn without(status: Status) -> Solved<Relaxed> {
 /// and, besides, not above `v_f` or below the start of a rise.
 /// `NegativeFriction` where `tau < 0` on the path.
 pub fn solve(law: StateLaw, transition: &Transition, t_f: f64, v_ceiling: f64) -> Solved<Relaxed> {
+    find(law, transition, t_f, v_ceiling).0
+}
+
+/// The outcome of [`solve`]; with numbers also the problem and its path.
+fn find(
+    law: StateLaw,
+    transition: &Transition,
+    t_f: f64,
+    v_ceiling: f64,
+) -> (Solved<Relaxed>, Option<(Problem, Path)>) {
     let problem = match Problem::new(law, transition, v_ceiling) {
         Ok(problem) if t_f > 0.0 && t_f.is_finite() => problem,
-        Ok(_) => return without(Status::Infeasible),
-        Err(status) => return without(status),
+        Ok(_) => return (without(Status::Infeasible), None),
+        Err(status) => return (without(status), None),
     };
     if t_f < problem.least_time() {
-        return without(Status::Infeasible);
+        return (without(Status::Infeasible), None);
     }
-    match problem.path(t_f) {
+    let path = problem.path(t_f);
+    let solved = match &path {
         Some(path) => path.solved(&problem, t_f),
         // The price may be negative or infinite there.
         None if !problem.is_proven(t_f) || problem.from.v > v_ceiling => without(Status::Unproven),
         None => without(Status::NotConverged),
-    }
+    };
+    (solved, path.filter(|_| solved.value.is_some()).map(|path| (problem, path)))
 }
 
 /// The derivatives of the work of [`solve`], those that do not exist infinite or NaN; `None` without an optimum.
 pub fn slopes(law: StateLaw, transition: &Transition, t_f: f64, v_ceiling: f64) -> Option<Slopes> {
-    let problem = Problem::new(law, transition, v_ceiling).ok()?;
-    let path = problem.path(t_f)?;
-    let hamiltonian = path.solved(&problem, t_f).value?.optimum.hamiltonian;
-    Some(slopes::of_path(&path, &problem, hamiltonian))
+    let (solved, found) = find(law, transition, t_f, v_ceiling);
+    let (problem, path) = found?;
+    Some(slopes::of_path(&path, &problem, solved.value?.optimum.hamiltonian))
 }
 
 /// The least ceiling under which an acceleration may last for `t_f`; `None` for a deceleration.
@@ -128,11 +139,9 @@ pub fn motion(
     t_f: f64,
     v_ceiling: f64,
 ) -> (Solved<Relaxed>, Option<Box<dyn Motion>>) {
-    let solved = solve(law, transition, t_f, v_ceiling);
-    let Ok(problem) = Problem::new(law, transition, v_ceiling) else { return (solved, None) };
-    let path = solved.value.and_then(|_| problem.path(t_f));
-    let motion = path.map(|path| Box::new(motion::BangBang::new(&problem, &path, t_f)) as Box<dyn Motion>);
-    (solved, motion)
+    let (solved, found) = find(law, transition, t_f, v_ceiling);
+    let motion = |(problem, path)| Box::new(motion::BangBang::new(&problem, &path, t_f)) as Box<dyn Motion>;
+    (solved, found.map(motion))
 }
 
 /// Error bound of the work: all is in closed form, but for rounding.
