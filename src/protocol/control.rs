@@ -35,11 +35,6 @@ impl SpringBlock {
         1.0 + self.law.a * ln(jet.v[0]) + self.law.b * ln(jet.theta)
     }
 
-    /// Spring force, `k s = tau + m v'`.
-    pub fn spring_force(&self, jet: &Jet) -> f64 {
-        self.friction(jet) + self.m * jet.v[1]
-    }
-
     /// Control velocity `v_c`, in `v_0`.
     pub fn control(&self, jet: &Jet) -> f64 {
         let [v, v1, v2, _] = jet.v;

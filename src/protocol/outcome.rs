@@ -84,6 +84,11 @@ impl std::ops::AddAssign for SolverStats {
 }
 
 impl<T> Solved<T> {
+    /// The outcome of a solve without numbers.
+    pub const fn without_numbers(status: Status, stats: SolverStats) -> Solved<T> {
+        Solved { status, value: None, stats }
+    }
+
     /// The result with `convert`ed numbers.
     pub fn map<U>(self, convert: impl FnOnce(T) -> U) -> Solved<U> {
         Solved { status: self.status, value: self.value.map(convert), stats: self.stats }

@@ -8,17 +8,14 @@ use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, rows};
 use crate::grid::Quantity;
 use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, Theta, TimeLeft, VelocityCeiling};
 use crate::model::Law;
-use crate::protocol::optimal::{self, FeedbackPoint};
-
-/// The words of `arc`, in the order of [`ArcKind::ALL`](crate::protocol::optimal::ArcKind::ALL).
-const ARCS: &[&str] = &["free", "floor", "v_ceiling", "tau_ceiling"];
+use crate::protocol::optimal::{self, ArcKind, FeedbackPoint};
 
 fields! { FeedbackPoint:
     v "v_0" "velocity of the optimal protocol now" => |point| point.v;
     work_to_go "mu_0 sigma l" "least work of friction in the time left" => |point| point.work_to_go;
     costate "mu_0 sigma v_0" "d work_to_go/d theta; -beta of a trace" => |point| point.costate;
     gain "v_0^2/l" "dv/dtheta at fixed t_left" => |point| point.gain;
-    arc (Kind::Label(ARCS)) "the bound on which the protocol is now, or free if on none"
+    arc (Kind::Label(&ArcKind::NAMES)) "the bound on which the protocol is now, or free if on none"
         => |point| f64::from(point.arc as u8);
 }
 
@@ -42,18 +39,4 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let solved = optimal::feedback_at(law, theta, t_left, v_f, with_ceilings(job, point), job.rtol);
         (solved.status, solved.value, RunStats { own_optima: 1, ..RunStats::from(solved.stats) })
     })
-}
-
-#[cfg(test)]
-mod tests {
-    //! The words of the column are those of its type.
-
-    use super::*;
-    use crate::protocol::optimal::ArcKind;
-
-    #[test]
-    fn arcs_are_named_alike() {
-        assert_eq!(ArcKind::ALL.map(ArcKind::name), ARCS);
-        assert_eq!(ArcKind::ALL.map(|arc| arc as usize), [0, 1, 2, 3]);
-    }
 }

@@ -8,16 +8,15 @@ use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, numbe
 use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Law, Time, VelocityCeiling};
 use crate::grid::{Block, Point, Quantity};
 use crate::model::{Friction, StateLaw};
-use crate::protocol::optimal::{self, Bounds, Obstacle, Optimum, Slopes};
+use crate::protocol::optimal::{self, Bounds, Obstacle, Optimum, Slopes, Strategy};
 use crate::protocol::relaxed::{self, Chatter, Relaxed};
 use crate::protocol::{Solved, Status, arcsinh};
 
-/// The words of `strategy`, in the order of [`Strategy::ALL`](crate::protocol::optimal::Strategy::ALL).
-pub(super) static STRATEGIES: &[&str] =
-    &["speed_up", "slow_down", "floor", "wait_jerk", "jerk_wait", "chatter", "rise"];
+/// The words of `strategy`.
+pub(super) static STRATEGIES: &[&str] = &Strategy::NAMES;
 
-/// Those of the ageing law.
-pub(super) static STRATEGIES_OF_AGEING: &[&str] = &["speed_up", "slow_down", "floor"];
+/// Those of the ageing law, which are the first.
+pub(super) static STRATEGIES_OF_AGEING: &[&str] = STRATEGIES.split_at(3).0;
 
 /// The words of `binding`.
 const BINDING: &[&str] = &["none", "v_ceiling", "tau_ceiling", "both"];
@@ -232,20 +231,5 @@ fn code(obstacle: Obstacle) -> usize {
         Obstacle::TooSlow { .. } => 2,
         Obstacle::VCeiling { .. } => 3,
         Obstacle::TauCeiling { .. } => 4,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    //! The words of the column are those of its type.
-
-    use super::*;
-    use crate::protocol::optimal::Strategy;
-
-    #[test]
-    fn strategies_are_named_alike() {
-        assert_eq!(Strategy::ALL.map(Strategy::name), STRATEGIES);
-        assert_eq!(Strategy::ALL.map(|strategy| strategy as usize), [0, 1, 2, 3, 4, 5, 6]);
-        assert_eq!(STRATEGIES_OF_AGEING, &STRATEGIES[..3]);
     }
 }

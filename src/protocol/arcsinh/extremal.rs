@@ -24,7 +24,7 @@ enum Chart {
 /// An extremal between two coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Extremal {
-    law: Law,
+    pub law: Law,
     chart: Chart,
     from: f64,
     length: f64,
@@ -36,7 +36,7 @@ pub(super) struct Point {
     pub ln_theta: f64,
     pub theta: f64,
     /// `ln u`.
-    ln_u: f64,
+    pub ln_u: f64,
     /// `u - 1`.
     excess: f64,
     /// Level of friction, `ln v + (1 + b ln theta)/a`.
@@ -69,11 +69,6 @@ impl Extremal {
         let level = steady_level(&law, ln_theta);
         let scale = scaled_friction(level + ln_u) - reduction(level + ln_u).0 * exp_m1(ln_u);
         Extremal { law, chart: Chart::Falling { ln_theta, theta: exp(ln_theta), level, scale }, from: 0.0, length }
-    }
-
-    /// Its law of friction.
-    pub fn law(&self) -> &Law {
-        &self.law
     }
 
     /// The part between two fractions of the length.
@@ -178,11 +173,6 @@ const SCAN: u32 = 32;
 const TERNARY_STEPS: u32 = 40;
 
 impl Point {
-    /// `ln u`.
-    pub fn ln_u(&self) -> f64 {
-        self.ln_u
-    }
-
     /// The velocity; 0 below the normal numbers.
     pub fn velocity(&self) -> f64 {
         let v = exp(self.ln_u) / self.theta;

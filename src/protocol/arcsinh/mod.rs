@@ -41,30 +41,28 @@ struct Problem {
 /// `Infeasible` unless `t_f` is above [`least_time`], and outside the domain (`a > 0`, `b >= 0`, `v_i, v_f > 0`, `t_f > 0`, all finite). `Unproven`
 /// where steady friction at the least theta is at most `(b - a) tanh(tau/a)`, which needs `b > 2 a`: extremals need not be unique there.
 pub fn solve(transition: &Transition, t_f: f64) -> Solved<Regularised> {
-    let Solved { status, value, stats } = extremal(transition, t_f);
-    Solved { status, value: value.map(|(found, _)| found), stats }
+    extremal(transition, t_f).map(|(found, _)| found)
 }
 
 /// The optimum of duration `t_f` and its motion; see [`solve`].
 pub fn motion(transition: &Transition, t_f: f64) -> (Solved<Regularised>, Option<Box<dyn Motion>>) {
-    let Solved { status, value, mut stats } = extremal(transition, t_f);
-    let motion = value.and_then(|(_, member)| motion::ExtremalMotion::new(member, t_f, &mut stats));
-    let value = value.map(|(found, _)| found);
-    (Solved { status, value, stats }, motion.map(|motion| Box::new(motion) as Box<dyn Motion>))
+    let mut solved = extremal(transition, t_f);
+    let motion = solved.value.and_then(|(_, member)| motion::ExtremalMotion::new(member, t_f, &mut solved.stats));
+    (solved.map(|(found, _)| found), motion.map(|motion| Box::new(motion) as Box<dyn Motion>))
 }
 
 /// The optimum and its extremal.
 fn extremal(transition: &Transition, t_f: f64) -> Solved<(Regularised, Extremal)> {
     let mut stats = SolverStats::default();
     let problem = Problem::new(transition).filter(|problem| t_f.is_finite() && t_f > problem.least_time());
-    let Some(problem) = problem else { return Solved { status: Status::Infeasible, value: None, stats } };
-    let is_proven = problem.is_proven();
-    match problem.optimum(t_f, &mut stats) {
-        Some(found) if is_proven => Solved { status: Status::Ok, value: Some(found), stats },
-        Some(found) => Solved { status: Status::Unproven, value: Some(found), stats },
-        None if is_proven => Solved { status: Status::NotConverged, value: None, stats },
-        None => Solved { status: Status::Unproven, value: None, stats },
-    }
+    let Some(problem) = problem else { return Solved::without_numbers(Status::Infeasible, stats) };
+    let value = problem.optimum(t_f, &mut stats);
+    let status = match value {
+        _ if !problem.is_proven() => Status::Unproven,
+        Some(_) => Status::Ok,
+        None => Status::NotConverged,
+    };
+    Solved { status, value, stats }
 }
 
 /// The infimum of feasible durations, `1/v_f - 1/v_i` or 0: a block at rest ages at the rate 1; `None` outside the domain.
@@ -105,18 +103,17 @@ impl Problem {
     fn member(&self, q: f64) -> Option<Extremal> {
         let law = self.transition.law;
         let far = (q * q + self.ratio).sqrt();
+        let length = if q < 0.0 { self.ratio / (far - q) } else { far + q };
         if self.rises {
-            let length = if q < 0.0 { self.ratio / (far - q) } else { far + q };
             return Some(Extremal::turning(law, self.ln_to + q * q, -far, length));
         }
-        let length = if q < 0.0 { self.ratio / (far - q) } else { far + q };
         if q >= -TURNING_CHART_END {
             return Some(Extremal::turning(law, self.ln_from + q * q, -q, length));
         }
         let slowest =
             Extremal::turning(law, self.ln_from + TURNING_CHART_END * TURNING_CHART_END, TURNING_CHART_END, 0.0)
                 .at(0.0)?;
-        Some(Extremal::falling(law, self.ln_from, slowest.ln_u() - q - TURNING_CHART_END, self.ratio))
+        Some(Extremal::falling(law, self.ln_from, slowest.ln_u - q - TURNING_CHART_END, self.ratio))
     }
 
     /// What the search compares: duration, or the time above the least one.

@@ -1,7 +1,7 @@
 //! An extremal of regularised friction over time.
 
 use super::extremal::Extremal;
-use crate::model::{Friction, Law};
+use crate::model::Friction;
 use crate::protocol::{Moment, Motion, SolverStats};
 
 /// Intervals between landmarks. Measured: with so many, all random optima of the physical domain can be traced (`cargo test random_optima`).
@@ -58,7 +58,7 @@ impl Motion for ExtremalMotion {
         let Some(point) = self.extremal.at(s) else {
             return Moment { t, v: f64::NAN, theta: f64::NAN, friction: f64::NAN, v_c: None, beta: None };
         };
-        let law: &Law = self.extremal.law();
+        let law = &self.extremal.law;
         let beta = Some(-point.costate(law));
         Moment { t, v: point.velocity(), theta: point.theta, friction: point.friction(law), v_c: None, beta }
     }

@@ -97,7 +97,7 @@ impl Default for Sums {
 }
 
 impl Sums {
-    fn add(&mut self, other: &Sums) {
+    pub fn add(&mut self, other: &Sums) {
         self.time += other.time;
         self.lag += other.lag;
         self.work += other.work;
@@ -118,9 +118,9 @@ impl Sums {
 /// and `tau = b u - a` is a minimum for `(u - 1)(b - a) < 0` and a maximum for `(u - 1)(b - a) > 0`.
 pub(super) fn friction_range(law: &Law, c: f64, [start, end]: &[ArcPoint; 2]) -> [f64; 2] {
     let Law { a, b } = *law;
-    let friction = |point: &ArcPoint| 1.0 + a * point.ln_u + (b - a) * point.ln_theta;
-    let rate = |point: &ArcPoint| friction(point) + a - b * exp(point.ln_u);
-    let mut range = [friction(start).min(friction(end)), friction(start).max(friction(end))];
+    let rate = |point: &ArcPoint| point.friction(law) + a - b * exp(point.ln_u);
+    let ends = [start, end].map(|point| point.friction(law));
+    let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
     let scale = (a - b) / c;
     if !(b > 0.0 && scale > 0.0 && scale.is_finite()) {
         return range;
@@ -155,6 +155,11 @@ pub(super) fn friction_range(law: &Law, c: f64, [start, end]: &[ArcPoint; 2]) ->
     range
 }
 
+/// Friction at a lifetime with `u = 1`. At the turning point it is `c_h = -C theta_h`.
+pub(super) fn steady_friction(law: &Law, ln_theta: f64) -> f64 {
+    1.0 + (law.b - law.a) * ln_theta
+}
+
 /// `phi(z) = e^z - 1 - z`, the left side of the turning equation, without cancellation near 0.
 pub(super) fn phi(z: f64) -> f64 {
     phi_and_slope(z).0
@@ -179,15 +184,10 @@ const PHI_OVER_HALF_SQUARE: [f64; 12] = {
 };
 
 impl Arc {
-    /// `c_h = -C theta_h = 1 + (b - a) ln theta_h`, the friction at the turning point (there `u = 1`).
-    fn friction_at_turn(&self, ln_theta_h: f64) -> f64 {
-        1.0 + (self.law.b - self.law.a) * ln_theta_h
-    }
-
     /// The conserved `C`.
     pub fn c(&self) -> f64 {
         match self.chart {
-            Chart::Turning { theta_h, ln_theta_h, .. } => -self.friction_at_turn(ln_theta_h) / theta_h,
+            Chart::Turning { theta_h, ln_theta_h, .. } => -steady_friction(&self.law, ln_theta_h) / theta_h,
             Chart::Direct { theta_a, z_a, friction_a, .. } => (self.law.a * phi(z_a) - friction_a) / theta_a,
         }
     }
@@ -205,24 +205,20 @@ impl Arc {
 
     /// The start of the arc; `None` where `E < 0` (no such extremal).
     pub fn start(&self) -> Option<Turning> {
-        match self.chart {
-            Chart::Turning { x_start, .. } => self.edge(x_start),
-            Chart::Direct { y_start, .. } => self.edge(y_start),
-        }
+        let (Chart::Turning { x_start: start, .. } | Chart::Direct { y_start: start, .. }) = self.chart;
+        self.edge(start)
     }
 
     /// The end of the arc; `None` where `E < 0`.
     pub fn end(&self) -> Option<Turning> {
-        match self.chart {
-            Chart::Turning { x_end, .. } => self.edge(x_end),
-            Chart::Direct { y_end, .. } => self.edge(y_end),
-        }
+        let (Chart::Turning { x_end: end, .. } | Chart::Direct { y_end: end, .. }) = self.chart;
+        self.edge(end)
     }
 
     /// The integrands at a coordinate of the chart.
     fn edge(&self, at: f64) -> Option<Turning> {
         let w = match self.chart {
-            Chart::Turning { ln_theta_h, .. } => at * omega(&self.law, self.friction_at_turn(ln_theta_h), at * at),
+            Chart::Turning { ln_theta_h, .. } => at * omega(&self.law, steady_friction(&self.law, ln_theta_h), at * at),
             Chart::Direct { z_a, friction_a, .. } => {
                 (2.0 * direct_e(&self.law, phi(z_a), friction_a, at, exp(at))).sqrt().copysign(z_a)
             }
@@ -241,7 +237,7 @@ impl Arc {
 
     /// The arc as a line in the coordinate of its chart, `p` or `y`.
     #[inline(always)]
-    fn line(&self) -> (Line<4>, Slice) {
+    fn line(&self) -> (Line, Slice) {
         match self.chart {
             Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } => {
                 self.turning_line(theta_h, ln_theta_h, x_start, x_end, x_squares)
@@ -252,16 +248,9 @@ impl Arc {
         }
     }
 
-    fn turning_line(
-        &self,
-        theta_h: f64,
-        ln_theta_h: f64,
-        x_start: f64,
-        x_end: f64,
-        x_squares: f64,
-    ) -> (Line<4>, Slice) {
+    fn turning_line(&self, theta_h: f64, ln_theta_h: f64, x_start: f64, x_end: f64, x_squares: f64) -> (Line, Slice) {
         let Law { a, b } = self.law;
-        let c_h = self.friction_at_turn(ln_theta_h);
+        let c_h = steady_friction(&self.law, ln_theta_h);
         // Scale of the layer: w = X/layer near the turning point.
         let layer = (a / (2.0 * (c_h + a - b))).sqrt();
         let sigma = if LAYERS * layer < 1.0 { LAYERS * layer } else { 1.0 };
@@ -292,7 +281,7 @@ impl Arc {
         (Line { start, length, singular }, Slice::Turning(slice))
     }
 
-    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line<4>, Slice) {
+    fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line, Slice) {
         let Law { a, b } = self.law;
         let (phi_a, slope_a) = phi_and_slope(z_a);
         let (low, c) = (y_start.min(y_end), a * phi_a - friction_a);
@@ -334,14 +323,14 @@ impl Arc {
 }
 
 /// An arc along the coordinate of its chart, `[start, start + length]`.
-struct Line<const N: usize> {
+struct Line {
     start: f64,
     length: f64,
     /// Singularities as `(real, imaginary)` places in the upper half plane.
-    singular: [(f64, f64); N],
+    singular: [(f64, f64); 4],
 }
 
-impl<const N: usize> Line<N> {
+impl Line {
     /// The number of pieces with few nodes.
     fn pieces(&self) -> u32 {
         self.cut(PIECE_NODES as f64, MAX_PIECES, PIECE_TOLERANCE).0
@@ -442,6 +431,13 @@ pub(super) struct ArcPoint {
     pub ln_u: f64,
 }
 
+impl ArcPoint {
+    /// Friction there.
+    pub fn friction(&self, law: &Law) -> f64 {
+        1.0 + law.a * self.ln_u + (law.b - law.a) * self.ln_theta
+    }
+}
+
 /// Nodes of a piece. Chosen: two vectors of lanes.
 const PIECE_NODES: usize = 2 * LANES;
 
@@ -452,15 +448,24 @@ const MAX_PIECES: u32 = 1024;
 const PIECE_TOLERANCE: f64 = 1e-15;
 
 impl EqualSteps {
-    /// Time from one place to another of the same piece; places run from 0 at the start of the arc to 1 at its end.
+    /// The places at both ends of a piece; places run from 0 at the start of the arc to 1 at its end.
+    pub fn edges_of(&self, piece: usize) -> [f64; 2] {
+        [piece, piece + 1].map(|edge| edge as f64 / f64::from(self.count))
+    }
+
+    /// Those of all pieces.
+    pub fn edges(&self) -> impl Iterator<Item = [f64; 2]> {
+        (0..self.count as usize).map(|piece| self.edges_of(piece))
+    }
+
+    /// Time from one place to another of the same piece.
     pub fn time(&self, from: f64, to: f64) -> f64 {
         self.sums(from, to).time
     }
 
     /// Time of all pieces, and the least friction met.
     fn whole(&self) -> (f64, f64) {
-        let edge = |piece: u32| f64::from(piece) / f64::from(self.count);
-        let all = (0..self.count).map(|piece| self.sums(edge(piece), edge(piece + 1)));
+        let all = self.edges().map(|[from, to]| self.sums(from, to));
         all.fold((0.0, f64::INFINITY), |(time, least), sums| (time + sums.time, least.min(sums.friction_min)))
     }
 
@@ -470,7 +475,7 @@ impl EqualSteps {
         self.slice.sums::<false>(middle, half, rule(PIECE_NODES))
     }
 
-    /// The point at `place`, as in [`EqualSteps::time`].
+    /// The point at `place`.
     pub fn at(&self, place: f64) -> ArcPoint {
         let along = self.start + place * self.length;
         match &self.slice {

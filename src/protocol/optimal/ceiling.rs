@@ -117,7 +117,7 @@ pub(super) fn ln_ratio(v: f64, above: f64, v_f: f64) -> f64 {
 /// An arc on a ceiling, along which theta goes one way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CeilingArc {
-    ceilings: Ceilings,
+    pub ceilings: Ceilings,
     pub kind: ArcKind,
     /// Contact lifetime at the end of greater theta.
     pub theta_hi: f64,
@@ -148,14 +148,6 @@ pub(super) struct CeilingSums {
     /// Integral of the multiplier times `ln theta`.
     pub price_ln_theta: f64,
     pub nodes: u32,
-}
-
-/// Place and weight of a node on a ceiling.
-struct CeilingNode {
-    depth: Depth,
-    z: f64,
-    /// Its weight in time.
-    dt: f64,
 }
 
 impl CeilingArc {
@@ -212,41 +204,35 @@ impl CeilingArc {
         ln_1p(u * exp_m1(self.length) / x)
     }
 
-    /// Visits the nodes of the arc; returns the time without nodes.
-    fn visit(&self, mut node: impl FnMut(&CeilingNode)) -> f64 {
-        let line = CeilingLine::of(self);
-        for chart in line.charts(self) {
-            chart.nodes(|at, weight| {
-                let (s, size, scale) = line.place(chart.near, at);
-                let (near, far) = (s, self.length - s);
-                let (below, above) = if line.high_first { (near, far) } else { (far, near) };
-                let (depth, z) = (Depth { below, above }, line.sign * size);
-                node(&CeilingNode { depth, z, dt: self.theta_hi * exp(-below) * weight * scale / exp_m1(z).abs() });
-            });
-        }
-        line.lingered
-    }
-
     /// Parts of the work, and the prices.
     pub fn sums(&self, gap: &Gap) -> CeilingSums {
         let ln_theta_hi = ln(self.theta_hi);
         let Law { a, b } = self.ceilings.law;
         let mut sums = CeilingSums::default();
         let of_v = self.kind == ArcKind::VCeiling;
-        let lingered = self.visit(|&CeilingNode { depth, z, dt }| {
-            let ln_theta = ln_theta_hi - depth.below;
-            let (u, excess) = exp_and_m1(z);
-            let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
-            let ln_v = z - ln_theta;
-            sums.creep += v * ln_v * dt;
-            sums.state += v * ln_theta * dt;
-            sums.nodes += 1;
-            // Positive: gap and u - 1 differ in sign on both kinds of arc.
-            let price = -gap.value(depth) / excess * if of_v { 1.0 } else { v / a } * dt;
-            sums.price += price;
-            sums.price_ln_v += price * ln_v;
-            sums.price_ln_theta += price * ln_theta;
-        });
+        let line = CeilingLine::of(self);
+        for chart in line.charts(self) {
+            chart.nodes(|at, weight| {
+                let (s, size, scale) = line.place(chart.near, at);
+                let (near, far) = (s, self.length - s);
+                let (below, above) = if line.high_first { (near, far) } else { (far, near) };
+                let (z, ln_theta) = (line.sign * size, ln_theta_hi - below);
+                let (u, excess) = exp_and_m1(z);
+                let dt = self.theta_hi * exp(-below) * weight * scale / exp_m1(z).abs();
+                let v = if of_v { self.ceilings.v } else { u * exp(-ln_theta) };
+                let ln_v = z - ln_theta;
+                sums.creep += v * ln_v * dt;
+                sums.state += v * ln_theta * dt;
+                sums.nodes += 1;
+                // Positive: gap and u - 1 differ in sign on both kinds of arc.
+                let gap = gap.value(self, Depth { below, above });
+                let price = -gap / excess * if of_v { 1.0 } else { v / a } * dt;
+                sums.price += price;
+                sums.price_ln_v += price * ln_v;
+                sums.price_ln_theta += price * ln_theta;
+            });
+        }
+        let lingered = line.lingered;
         if lingered > 0.0 {
             // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
             let depth = self.end(self.z_hi.abs() <= self.z_lo.abs());
@@ -275,7 +261,7 @@ impl CeilingArc {
     }
 
     /// The parts before and after a place, from 0 at the start to 1 at the end.
-    pub fn cut(&self, ceilings: &Ceilings, place: f64) -> [CeilingArc; 2] {
+    pub fn cut(&self, place: f64) -> [CeilingArc; 2] {
         let from_high = if self.falls() { place } else { 1.0 - place };
         let (high, change) = self.coordinates();
         let rise = self.rise();
@@ -299,8 +285,8 @@ impl CeilingArc {
         };
         let ln_z = if at < ln(LINEAR_LN_U) && !even { at } else { ln(z.abs()) };
         let mut parts = [
-            ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
-            ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
+            self.ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
+            self.ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
         ];
         // The end nearer to u = 1 keeps its logarithm.
         let high_first = self.z_hi.abs() <= self.z_lo.abs();

@@ -5,11 +5,11 @@
 
 use std::cell::Cell;
 
-use super::ArcKind;
-use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope};
+use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
 use super::ceiling::{CeilingArc, Ceilings};
-use super::extremal::{Extremal, FreeSums, Problem};
+use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
+use super::{ArcKind, floor};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 
@@ -171,10 +171,6 @@ pub(super) enum ClampedPiece {
 /// nothing cancels.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gap {
-    a: f64,
-    b: f64,
-    /// `d ln u/d ln theta`.
-    rise: f64,
     /// Whether it counts from the end of greater theta, or from the other.
     from_high: bool,
     /// The value, `u` and `C theta` there.
@@ -211,12 +207,11 @@ impl Gap {
         self.pull * exp(self.way(depth))
     }
 
-    /// The value.
-    pub fn value(&self, depth: Depth) -> f64 {
-        let y = self.way(depth);
-        let of_v = self.rise == 1.0;
-        let (grown, bend) = if of_v { (exp_m1(y), self.b * y) } else { (exp_m1(self.rise * y), 0.0) };
-        self.value + self.a * self.u * grown - self.pull * exp_m1(y) - bend
+    /// The value at a place on `arc`.
+    pub fn value(&self, arc: &CeilingArc, depth: Depth) -> f64 {
+        let (Law { a, b }, rise, y) = (arc.ceilings.law, arc.rise(), self.way(depth));
+        let (grown, bend) = if rise == 1.0 { (exp_m1(y), b * y) } else { (exp_m1(rise * y), 0.0) };
+        self.value + a * self.u * grown - self.pull * exp_m1(y) - bend
     }
 }
 
@@ -225,24 +220,10 @@ impl Gap {
 pub(super) struct Path {
     pub extremal: Extremal,
     pieces: [Option<ClampedPiece>; Path::MAX_PIECES],
-    count: usize,
     /// Times on the ceilings of the velocity and of friction.
     pub times: (f64, f64),
     /// Derivative of the time with respect to the parameter where quadratures do not resolve it.
     rate: Option<f64>,
-}
-
-/// What a quadrature along a path finds.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PathSums {
-    /// Time at the floor and all pieces.
-    pub time: f64,
-    /// Of the free pieces.
-    pub work: f64,
-    /// Derivative of the time with respect to the parameter of the family.
-    pub rate: f64,
-    pub friction_min: f64,
-    pub nodes: u32,
 }
 
 impl Path {
@@ -258,7 +239,7 @@ impl Path {
 
     /// A path without pieces.
     fn new(extremal: Extremal) -> Path {
-        Path { extremal, pieces: [None; Path::MAX_PIECES], count: 0, times: (0.0, 0.0), rate: None }
+        Path { extremal, pieces: [None; Path::MAX_PIECES], times: (0.0, 0.0), rate: None }
     }
 
     /// The pieces in their order.
@@ -271,9 +252,8 @@ impl Path {
             let time = if arc.kind == ArcKind::VCeiling { &mut self.times.0 } else { &mut self.times.1 };
             *time += arc.time();
         }
-        if self.count < self.pieces.len() {
-            self.pieces[self.count] = Some(piece);
-            self.count += 1;
+        if let Some(room) = self.pieces.iter_mut().find(|room| room.is_none()) {
+            *room = Some(piece);
         }
     }
 
@@ -336,9 +316,10 @@ impl Path {
         let mut known = [false; Path::MAX_PIECES];
         for at_end in [false, true] {
             let mut neighbour: Option<Option<f64>> = None;
-            for step in 0..self.count {
-                let i = if at_end { self.count - 1 - step } else { step };
-                let Some(ClampedPiece::Ceiling { arc, gap }) = &mut self.pieces[i] else {
+            for step in 0..Path::MAX_PIECES {
+                let i = if at_end { Path::MAX_PIECES - 1 - step } else { step };
+                let Some(piece) = &mut self.pieces[i] else { continue };
+                let ClampedPiece::Ceiling { arc, gap } = piece else {
                     neighbour = Some(Some(0.0));
                     continue;
                 };
@@ -347,71 +328,42 @@ impl Path {
                     gap.refer(arc, near_high, value);
                     known[i] = true;
                 }
-                neighbour = Some(known[i].then(|| gap.value(far)));
+                neighbour = Some(known[i].then(|| gap.value(arc, far)));
             }
         }
     }
 
-    /// Quadrature of all pieces to relative accuracy `tolerance`.
-    pub fn sums(&self, tolerance: f64) -> Option<PathSums> {
-        let mut found =
-            PathSums { time: self.extremal.time_at_floor, work: 0.0, rate: 0.0, friction_min: f64::INFINITY, nodes: 0 };
-        let mut free = FreeSums::default();
+    /// Quadrature of the free pieces to relative accuracy `tolerance`, but with the whole time, also at the floor and on the ceilings;
+    /// and the derivative of that time with respect to the parameter of the family.
+    pub fn sums(&self, tolerance: f64) -> Option<(Sums, f64)> {
+        let mut sums = Sums { time: self.extremal.time_at_floor, ..Sums::default() };
+        let (mut ends, mut has) = (0.0, [false; 2]);
         for piece in self.pieces() {
             let ClampedPiece::Free { arc, turned, at, .. } = piece else { continue };
-            let Sums { time, work, sensitivity, swing, friction_min, nodes, .. } = arc.sums::<false>(tolerance)?;
-            found.time += time;
-            found.work += work;
-            found.friction_min = found.friction_min.min(friction_min);
-            found.nodes += nodes;
-            free.sensitivity += sensitivity;
-            free.ends += turned;
-            free.at_start |= at[0];
-            free.at_end |= at[1];
-            free.swing += swing;
+            sums.add(&arc.sums::<false>(tolerance)?);
+            ends += turned;
+            has = [has[0] || at[0], has[1] || at[1]];
         }
-        found.time += self.times.0 + self.times.1;
-        let rate = self.extremal.rate_of(&free);
-        found.rate = self.rate.unwrap_or(rate);
-        (found.time.is_finite() && found.work.is_finite()).then_some(found)
-    }
-
-    /// Work on the ceilings, and the nodes that it takes.
-    pub fn ceiling_work(&self) -> (f64, u32) {
-        self.pieces().fold((0.0, 0), |(work, nodes), piece| match piece {
-            ClampedPiece::Free { .. } => (work, nodes),
-            ClampedPiece::Ceiling { arc, .. } => {
-                let (of_arc, spent) = arc.work();
-                (work + of_arc, nodes + spent)
-            }
-        })
+        sums.time += self.times.0 + self.times.1;
+        let rate = self.rate.unwrap_or_else(|| self.extremal.rate_of(&sums, ends, has));
+        (sums.time.is_finite() && sums.work.is_finite()).then_some((sums, rate))
     }
 
     /// The path for reading.
     pub fn view(&self) -> PathView<'_> {
-        PathView { extremal: &self.extremal, pieces: &self.pieces, times: self.times }
+        PathView { extremal: &self.extremal, whole: None, pieces: &self.pieces, times: self.times }
     }
 }
 
-/// A path that is borrowed: a free extremal needs no room for five pieces.
+/// A path for reading: a free extremal needs no room for five pieces.
 pub(super) struct PathView<'a> {
     pub extremal: &'a Extremal,
+    /// A free extremal as one piece.
+    whole: Option<ClampedPiece>,
+    /// The pieces of a clamped one.
     pieces: &'a [Option<ClampedPiece>],
     /// Times on the ceilings of the velocity and of friction.
     pub times: (f64, f64),
-}
-
-impl PathView<'_> {
-    /// Reads a free extremal.
-    #[inline(always)]
-    pub fn of_free<T>(problem: &Problem, extremal: &Extremal, read: impl FnOnce(&PathView) -> T) -> T {
-        read(&PathView { extremal, pieces: &[Some(whole(problem, extremal))], times: (0.0, 0.0) })
-    }
-
-    /// The pieces in their order.
-    pub fn pieces(&self) -> impl Iterator<Item = &ClampedPiece> {
-        self.pieces.iter().flatten()
-    }
 }
 
 /// Friction along a path.
@@ -422,7 +374,31 @@ pub(super) struct FrictionRange {
     pub greatest: f64,
 }
 
-impl PathView<'_> {
+impl<'a> PathView<'a> {
+    /// A free extremal.
+    #[inline(always)]
+    pub fn of_free(problem: &Problem, extremal: &'a Extremal) -> PathView<'a> {
+        PathView { extremal, whole: Some(whole(problem, extremal)), pieces: &[], times: (0.0, 0.0) }
+    }
+
+    /// The pieces in their order.
+    pub fn pieces(&self) -> impl Iterator<Item = &ClampedPiece> {
+        self.whole.iter().chain(self.pieces.iter().flatten())
+    }
+
+    /// Work at the floor and on the ceilings, and the nodes that it takes.
+    pub fn bound_work(&self, problem: &Problem) -> (f64, u32) {
+        let (mut work, mut nodes) = (0.0, 0);
+        for piece in self.pieces() {
+            if let ClampedPiece::Ceiling { arc, .. } = piece {
+                let (of_arc, spent) = arc.work();
+                work += of_arc;
+                nodes += spent;
+            }
+        }
+        (work + floor::work(&problem.law, problem.from, self.extremal.time_at_floor), nodes)
+    }
+
     /// Friction along the pieces and at the floor; `met` is the least at nodes.
     #[inline(always)]
     pub fn friction(&self, problem: &Problem, met: f64) -> FrictionRange {
@@ -432,7 +408,7 @@ impl PathView<'_> {
         let mut range = FrictionRange { least, least_steady: f64::INFINITY, greatest: f64::NEG_INFINITY };
         for piece in self.pieces() {
             let ends = piece.ends();
-            let steady = |end: &ArcPoint| 1.0 + (law.b - law.a) * end.ln_theta;
+            let steady = |end: &ArcPoint| steady_friction(law, end.ln_theta);
             let at = |end: &ArcPoint| steady(end) + law.a * end.ln_u;
             let [low, high] = match piece.kind() {
                 ArcKind::Free => friction_range(law, c, &ends),
@@ -450,6 +426,18 @@ impl PathView<'_> {
 }
 
 impl ClampedPiece {
+    /// An arc on a ceiling with `G` from its `value` at the end of greater theta, where `C theta` is `pull`.
+    fn on_ceiling(arc: CeilingArc, pull: f64, value: f64) -> ClampedPiece {
+        ClampedPiece::Ceiling { arc, gap: Gap { from_high: true, value, u: exp(arc.z_hi), pull } }
+    }
+
+    pub fn kind(&self) -> ArcKind {
+        match self {
+            ClampedPiece::Free { .. } => ArcKind::Free,
+            ClampedPiece::Ceiling { arc, .. } => arc.kind,
+        }
+    }
+
     /// The start and the end.
     #[inline(always)]
     pub fn ends(&self) -> [ArcPoint; 2] {
@@ -481,7 +469,7 @@ pub(super) fn falling_part(problem: &Problem, ceilings: &Ceilings, extremal: &Ex
         theta_top,
         ln_theta_top,
         excess,
-        friction: 1.0 + (law.b - law.a) * ln_theta_top,
+        friction: steady_friction(&law, ln_theta_top),
         depth,
         z_v: ceilings.cap_of(ArcKind::VCeiling, depth),
         z_tau: ceilings.cap_of(ArcKind::TauCeiling, depth),
@@ -528,9 +516,8 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
         }
     };
     let switch = |d: f64| {
-        let kind = binding(fall, d);
-        let z = fall.cap(kind, d);
-        ArcPoint { theta: fall.theta_top * exp(-d), ln_theta: fall.ln_theta_top - d, ln_u: z }
+        let ln_u = fall.cap(ArcKind::VCeiling, d).min(fall.cap(ArcKind::TauCeiling, d));
+        ArcPoint { theta: fall.theta_top * exp(-d), ln_theta: fall.ln_theta_top - d, ln_u }
     };
     let [start, end] = ends_of(problem, extremal);
     let (start, end) = (if first { start } else { switch(from) }, if last { end } else { switch(to) });
@@ -540,12 +527,6 @@ fn part(problem: &Problem, extremal: &Extremal, fall: &Fall, from: f64, to: f64)
     ClampedPiece::Free { arc: Arc { law, chart }, turned, at: [first, last], ends: [start, end] }
 }
 
-/// The lower ceiling.
-fn binding(fall: &Fall, d: f64) -> ArcKind {
-    let of_v = fall.cap(ArcKind::VCeiling, d) < fall.cap(ArcKind::TauCeiling, d);
-    if of_v { ArcKind::VCeiling } else { ArcKind::TauCeiling }
-}
-
 /// An arc on a ceiling, with `G` from its end of greater theta.
 fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, [from, to]: [f64; 2], value: f64) -> ClampedPiece {
     let theta_hi = fall.theta_top * exp(-from);
@@ -553,23 +534,7 @@ fn ceiling_part(ceilings: &Ceilings, fall: &Fall, kind: ArcKind, [from, to]: [f6
     let z_lo = if to == fall.depth { ceilings.cap_of(kind, 0.0) } else { fall.cap(kind, to) };
     let arc = ceilings.arc(kind, theta_hi, to - from, fall.cap(kind, from), z_lo);
     let pull = (fall.excess - fall.friction) * exp(-from);
-    let gap = gap_of(fall.law, &arc, pull, value);
-    ClampedPiece::Ceiling { arc, gap }
-}
-
-/// `G` of an arc from its `value` at the end of greater theta, where `C theta` is `pull`.
-fn gap_of(law: Law, arc: &CeilingArc, pull: f64, value: f64) -> Gap {
-    let rise = arc.rise();
-    Gap { a: law.a, b: law.b, rise, from_high: true, value, u: exp(arc.z_hi), pull }
-}
-
-impl ClampedPiece {
-    pub fn kind(&self) -> ArcKind {
-        match self {
-            ClampedPiece::Free { .. } => ArcKind::Free,
-            ClampedPiece::Ceiling { arc, .. } => arc.kind,
-        }
-    }
+    ClampedPiece::on_ceiling(arc, pull, value)
 }
 
 impl Path {
@@ -614,8 +579,7 @@ impl Path {
         let mut path = Path::of(&sub, extremal);
         let pull = c * theta.theta;
         let mut add = |arc: CeilingArc| {
-            let gap = gap_of(law, &arc, pull * (arc.theta_hi / theta.theta), 0.0);
-            path.push(ClampedPiece::Ceiling { arc, gap });
+            path.push(ClampedPiece::on_ceiling(arc, pull * (arc.theta_hi / theta.theta), 0.0));
         };
         if let Some(ln_z) = ln_z {
             let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
@@ -686,25 +650,26 @@ mod tests {
                             let at = |q: f64| {
                                 let extremal = problem.extremal(q, q_floor)?;
                                 let path = Path::clamped(&problem, &ceilings, extremal, &Switches::unknown())?;
-                                Some((path.sums(1e-14)?, path.signature()))
+                                let (sums, rate) = path.sums(1e-14)?;
+                                Some(([sums.time, rate], path.signature()))
                             };
                             let (Some(before), Some(here), Some(after)) = (at(q - step), at(q), at(q + step)) else {
                                 continue;
                             };
                             let clamps = times.min(above) < f64::INFINITY;
-                            if before.1 != after.1 || (clamps && here.1 < 4) || here.0.time < 1e-9 {
+                            if before.1 != after.1 || (clamps && here.1 < 4) || here.0[0] < 1e-9 {
                                 continue;
                             }
                             if q.abs() < 2.0 * step || q_floor.is_some_and(|h| (q + h).abs() < 2.0 * step) {
                                 continue;
                             }
-                            let difference = (after.0.time - before.0.time) / (2.0 * step);
-                            let error = (difference - here.0.rate).abs() / here.0.rate.abs().max(1e-3 * here.0.time);
+                            let difference = (after.0[0] - before.0[0]) / (2.0 * step);
+                            let [time, rate] = here.0;
+                            let error = (difference - rate).abs() / rate.abs().max(1e-3 * time);
                             seen += 1;
                             assert!(
                                 error <= if clamps { 1e-4 } else { 1e-5 },
-                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {} difference {difference}",
-                                here.0.rate
+                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {rate} difference {difference}"
                             );
                         }
                     }

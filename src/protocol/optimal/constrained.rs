@@ -1,14 +1,14 @@
 //! The optimum under ceilings: the free one where it obeys them, else the clamped extremal of the same family that takes
 //! the given time.
 
-use super::arc::phi;
+use super::arc::{Sums, phi};
 use super::ceiling::Ceilings;
-use super::clamp::{Path, PathSums, PathView, Switch, Switches, falling_part};
-use super::extremal::{Extremal, Problem};
+use super::clamp::{Path, PathView, Switch, Switches, falling_part};
+use super::extremal::{MAX_LN_U, Problem};
 use super::guess::{Guess, QUADRATURE_ERROR, capped_guess};
 use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
-use super::{ArcKind, Optimum, floor};
+use super::{ArcKind, Optimum};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::root::Probe;
@@ -24,6 +24,17 @@ pub(super) enum Feasible {
     Sitting(f64),
     /// No time: the ceiling of this kind is too low.
     Never(ArcKind),
+}
+
+impl Feasible {
+    /// The least and the greatest feasible time.
+    pub fn times(&self) -> Option<(f64, f64)> {
+        match *self {
+            Feasible::Times(least, most) => Some((least, most)),
+            Feasible::Sitting(least) => Some((least, f64::INFINITY)),
+            Feasible::Never(_) => None,
+        }
+    }
 }
 
 /// What the ceilings allow, without iteration.
@@ -105,7 +116,7 @@ pub(super) struct Constrained {
 
 impl Constrained {
     pub fn without_numbers(status: Status, stats: SolverStats) -> Constrained {
-        Constrained { solved: Solved { status, value: None, stats }, path: None, sitting: None }
+        Constrained { solved: Solved::without_numbers(status, stats), path: None, sitting: None }
     }
 }
 
@@ -245,7 +256,6 @@ struct ClampedPaths<'a, M> {
 
 impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
     type Path = Path;
-    type Piece = u32;
 
     fn problem(&self) -> &Problem {
         self.problem
@@ -266,7 +276,7 @@ impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
     /// The value is the logarithm of the ratio of what the times have beyond the least, and of what they leave to the greatest.
     fn measure(&self, path: &Path, tolerance: f64) -> Option<Measured> {
         let &ClampedPaths { t_f, least, most, .. } = self;
-        let PathSums { time, work, rate, friction_min, nodes } = path.sums(tolerance)?;
+        let (Sums { time, work, friction_min, nodes, .. }, rate) = path.sums(tolerance)?;
         let sign = if self.rises { 1.0 } else { -1.0 };
         let probe = if time <= least {
             Probe { value: -sign * f64::MAX, slope: 0.0 }
@@ -296,17 +306,8 @@ impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
         false
     }
 
-    fn extremal(path: &Path) -> &Extremal {
-        &path.extremal
-    }
-
-    fn bound_work(&self, path: &Path) -> (f64, u32) {
-        let (work, nodes) = path.ceiling_work();
-        (work + floor::work(&self.problem.law, self.problem.from, path.extremal.time_at_floor), nodes)
-    }
-
-    fn in_pieces<T>(&self, path: &Path, read: impl FnOnce(&PathView) -> T) -> T {
-        read(&path.view())
+    fn view<'p>(&self, path: &'p Path) -> PathView<'p> {
+        path.view()
     }
 }
 
@@ -358,7 +359,7 @@ impl Search<'_> {
         };
         let tolerance = search::quadrature_tolerance(self.rtol);
         let nearest = member(ln(far)).and_then(|path| path.sums(tolerance));
-        if nearest.is_none_or(|sums| sums.time >= self.t_f) {
+        if nearest.is_none_or(|(sums, _)| sums.time >= self.t_f) {
             return None;
         }
         let bracket = (f64::NEG_INFINITY, ln(far));
@@ -433,7 +434,7 @@ fn all_on_ceilings(problem: &Problem, ceilings: &Ceilings) -> f64 {
             z_0 = turning((2.0 * most / a).sqrt()).ln_u;
         }
     }
-    if z_0.is_finite() { z_0 } else { MOST_LN_U }
+    if z_0.is_finite() { z_0 } else { MAX_LN_U }
 }
 
 /// The lifetime of this logarithm.
@@ -459,6 +460,3 @@ const LIMIT_RTOL: f64 = 16.0 * f64::EPSILON;
 
 /// Widens a bracket beyond its rounding. Chosen: far above the rounding, far below a step of the search.
 const MARGIN: f64 = 1e-6;
-
-/// Largest `ln u` that is searched. Derived: beyond, `e^(ln u)` comes near overflow, at 709.
-const MOST_LN_U: f64 = 690.0;

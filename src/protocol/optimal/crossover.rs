@@ -111,7 +111,7 @@ impl Quadratures {
         self.stats.quadratures += 1;
         self.stats.nodes += sums.nodes;
         let problem = self.problem;
-        let least = PathView::of_free(&problem, &extremal, |path| path.friction(&problem, sums.friction_min).least);
+        let least = PathView::of_free(&problem, &extremal).friction(&problem, sums.friction_min).least;
         self.meet(least, || is_proven(&problem, &extremal));
         (Some(extremal.time(&sums)), Some(extremal.work(&self.problem, &sums)))
     }

@@ -14,7 +14,7 @@
 //!
 //! A search counts `q` from `q_floor` where that exists, so that short floor arcs keep their digits.
 
-use super::arc::{Arc, Chart, Sums, phi, phi_and_slope};
+use super::arc::{Arc, Chart, Sums, omega, phi, phi_and_slope, steady_friction};
 use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
@@ -73,27 +73,20 @@ enum Rate {
     OneWay { gain: f64 },
 }
 
-/// Sums over all free pieces.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct FreeSums {
-    /// Of the sensitivity of the chart.
-    pub sensitivity: f64,
-    /// Of `theta/(u - 1)` at their ends less that at their starts, and of [`Extremal::end_terms`].
-    pub ends: f64,
-    /// Of the swing.
-    pub swing: f64,
-    /// Whether the start and the end of the extremal are among them.
-    pub at_start: bool,
-    pub at_end: bool,
-}
-
-/// The start of an arc of a rising problem.
+/// What an extremal does before its arc, with the fields of [`Extremal`].
 struct Leaving {
     time_at_floor: f64,
-    /// The term added to the lag of the arc.
+    theta_s: f64,
     late: f64,
-    /// `ln(theta_s/theta_1)`.
-    d: f64,
+    lags: bool,
+}
+
+impl Leaving {
+    /// The extremal that goes on along `arc`, with `ln u` from `start` to `end`.
+    fn along(self, arc: Arc, start: f64, end: f64, rate: Rate) -> Extremal {
+        let Leaving { time_at_floor, theta_s, late, lags } = self;
+        Extremal { time_at_floor, theta_s, late, lags, arc, start, end, rate }
+    }
 }
 
 impl Problem {
@@ -151,17 +144,17 @@ impl Problem {
 
     /// Friction at the anchor with `u = 1`.
     pub fn friction_a(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * self.anchor().ln
+        steady_friction(&self.law, self.anchor().ln)
     }
 
     /// Friction at the start with `u = 1`, `tau_ss(v_i)` where that is steady.
     pub fn friction_start(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * self.from.ln
+        steady_friction(&self.law, self.from.ln)
     }
 
     /// Friction at the end with `u = 1`, `tau_ss(v_f)` where that is steady.
     pub fn friction_end(&self) -> f64 {
-        1.0 + (self.law.b - self.law.a) * self.to.ln
+        steady_friction(&self.law, self.to.ln)
     }
 
     /// Scale of the turning layer at the anchor, `w = X/layer`; NaN where `tau <= b - a` there.
@@ -204,15 +197,14 @@ impl Problem {
         let law = self.law;
         let ln_theta = self.from.ln;
         let excess = law.a * phi(ln_theta);
-        let friction = 1.0 + (law.b - law.a) * ln_theta;
-        let xi = turning_distance(&law, excess, friction - excess)?;
+        let xi = turning_distance(&law, excess, self.friction_start() - excess)?;
         let x_squares = (1.0 + xi) * self.fall;
         let x = (xi + x_squares).sqrt();
         let one = |x_end: f64| {
             let (theta_h, ln_theta_h) = (self.from.theta * (1.0 + xi), ln_theta + ln_1p(xi));
             let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start: -xi.sqrt(), x_end, x_squares } };
-            let rate = Rate::Turning { gain: 0.0, inner: 0.0, outer: 0.0, one_way: 0.0 };
-            self.without_hold(arc, ln_theta, arc.end()?.ln_u, rate)
+            // No parameter leads along these arcs.
+            Some(self.at_once().along(arc, ln_theta, arc.end()?.ln_u, Rate::OneWay { gain: 0.0 }))
         };
         if x > 0.0 { Some([one(-x)?, one(x)?]) } else { None }
     }
@@ -239,8 +231,7 @@ impl Problem {
         let (released, growth) = since.aged_by(time);
         let Lifetime { theta, rest, ln: z } = released;
         let excess = law.a * phi(z);
-        let friction = 1.0 + (law.b - law.a) * z;
-        let xi = turning_distance(&law, excess, friction - excess)?;
+        let xi = turning_distance(&law, excess, steady_friction(&law, z) - excess)?;
         let (theta_h, ln_theta_h) = (theta * (1.0 + xi), z + ln_1p(xi));
         // theta_c/theta_1 - 1.
         let fall = fall + growth / self.to.theta;
@@ -248,27 +239,18 @@ impl Problem {
         let (x_start, x_end) = (-xi.sqrt(), (xi + x_squares).sqrt());
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
         let end = arc.end()?;
-        let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
+        let c_h = steady_friction(&law, ln_theta_h);
         // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the floor arc's own time cancels against the start
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
         let rate = Rate::Floor { gain: unit * m * rest / theta, inner: self.to.theta / end.excess, outer: unit * m };
-        Some(Extremal {
-            time_at_floor: self.t_min() + time,
-            theta_s: theta,
-            late: time,
-            lags: false,
-            arc,
-            start: z,
-            end: end.ln_u,
-            rate,
-        })
+        let leaving = Leaving { time_at_floor: self.t_min() + time, theta_s: theta, late: time, lags: false };
+        Some(leaving.along(arc, z, end.ln_u, rate))
     }
 
-    /// An arc from theta at the start to theta at the end.
-    fn without_hold(&self, arc: Arc, start: f64, end: f64, rate: Rate) -> Option<Extremal> {
-        let (late, lags) = (self.rest_beyond(), self.rises());
-        Some(Extremal { time_at_floor: 0.0, theta_s: self.from.theta, late, lags, arc, start, end, rate })
+    /// The start without a floor arc.
+    fn at_once(&self) -> Leaving {
+        Leaving { time_at_floor: 0.0, theta_s: self.from.theta, late: self.rest_beyond(), lags: self.rises() }
     }
 
     /// Falling problem, `q = ln u(0+) > 0`.
@@ -286,7 +268,7 @@ impl Problem {
             let (x_start, x_end) = (xi.sqrt(), (xi + x_squares).sqrt());
             let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
             let end = arc.end()?;
-            let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
+            let c_h = steady_friction(&law, ln_theta_h);
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
             let rate = if x_squares < xi {
                 // A short arc: both ends would cancel.
@@ -299,12 +281,12 @@ impl Problem {
                     one_way: -excess_0 / self.from.theta,
                 }
             };
-            return self.without_hold(arc, z_0, end.ln_u, rate);
+            return Some(self.at_once().along(arc, z_0, end.ln_u, rate));
         }
         let y_end = -self.depth();
         let chart = Chart::Direct { theta_a: self.from.theta, z_a: z_0, friction_a, y_start: 0.0, y_end };
         let arc = Arc { law, chart };
-        self.without_hold(arc, z_0, arc.end()?.ln_u, Rate::Direct { gain: 1.0 })
+        Some(self.at_once().along(arc, z_0, arc.end()?.ln_u, Rate::Direct { gain: 1.0 }))
     }
 
     /// Falling problem, `q <= 0`: `X = layer q` at the start.
@@ -325,7 +307,7 @@ impl Problem {
             outer: -layer * edge(&law, theta_h, ln_theta_h, x_start, &start),
             one_way: 0.0,
         };
-        self.without_hold(arc, start.ln_u, end.ln_u, rate)
+        Some(self.at_once().along(arc, start.ln_u, end.ln_u, rate))
     }
 
     /// Rising problem, `q < 0`: `ln u(t_f-)`, stretched under the bound.
@@ -349,8 +331,7 @@ impl Problem {
         let excess = law.a * phi_1;
         let friction_a = self.friction_a();
         let pull = friction_a - excess;
-        let Leaving { time_at_floor, late, d } = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta));
-        let theta_s = if time_at_floor > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
+        let (leaving, d) = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta));
         let rising = Rate::OneWay { gain: -stretch * excess_1 / self.to.theta };
         if may_turn(&law, excess, pull)
             && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
@@ -360,31 +341,22 @@ impl Problem {
             let (x_start, x_end) = (-(xi - x_squares).sqrt(), -xi.sqrt());
             let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
             let start = arc.start()?;
-            let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
+            let c_h = steady_friction(&law, ln_theta_h);
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
             let rate = if z_1 < -1.0 || -x_squares < xi {
                 rising
             } else {
                 Rate::Ending {
                     gain: stretch * swing * excess_1,
-                    inner: -theta_s / start.excess,
+                    inner: -leaving.theta_s / start.excess,
                     outer: stretch * self.to.theta * swing,
                 }
             };
-            return Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: z_1, rate });
+            return Some(leaving.along(arc, start.ln_u, z_1, rate));
         }
         let chart = Chart::Direct { theta_a: self.to.theta, z_a: z_1, friction_a, y_start: d, y_end: 0.0 };
         let arc = Arc { law, chart };
-        Some(Extremal {
-            time_at_floor,
-            theta_s,
-            late,
-            lags: true,
-            arc,
-            start: arc.start()?.ln_u,
-            end: z_1,
-            rate: rising,
-        })
+        Some(leaving.along(arc, arc.start()?.ln_u, z_1, rising))
     }
 
     /// Rising problem, `q >= 0`: `X = layer q` at the end.
@@ -395,20 +367,19 @@ impl Problem {
         let x2 = x_end * x_end;
         let grown = ln_1p(x2);
         let (theta_h, ln_theta_h) = (self.to.theta * (1.0 + x2), self.to.ln + grown);
-        let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
+        let c_h = steady_friction(&law, ln_theta_h);
         let excess = (law.a - law.b) * grown + c_h * x2 / (1.0 + x2);
-        let Leaving { time_at_floor, late, d } = self.leaving(excess - law.a * phi(self.to.ln));
-        let theta_s = if time_at_floor > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
+        let (leaving, d) = self.leaving(excess - law.a * phi(self.to.ln));
         let x_squares = -(1.0 + x2) * exp_m1(-d);
         let x_start = -(x2 - x_squares).sqrt();
         let arc = Arc { law, chart: Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares } };
         let (start, end) = (arc.start()?, arc.end()?);
         let rate = Rate::Ending {
             gain: layer * 2.0 * x_end / (1.0 + x2),
-            inner: -theta_s / start.excess,
+            inner: -leaving.theta_s / start.excess,
             outer: layer * edge(&law, theta_h, ln_theta_h, x_end, &end),
         };
-        Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
+        Some(leaving.along(arc, start.ln_u, end.ln_u, rate))
     }
 
     /// The member that turns at the lifetime `turn`, `depth = ln(turn/theta_1)`, where theta rises first; the parameter is
@@ -416,23 +387,22 @@ impl Problem {
     pub fn turning_at(&self, turn: Lifetime, depth: f64, gain: f64) -> Option<Extremal> {
         let law = self.law;
         let below = Problem { to: turn, fall: self.from.theta / turn.theta - 1.0, ..*self };
-        let Leaving { time_at_floor, late, d } = below.leaving(-law.a * phi(turn.ln));
-        let theta_s = if time_at_floor > 0.0 { turn.theta * exp(d) } else { self.from.theta };
+        let (leaving, d) = below.leaving(-law.a * phi(turn.ln));
         let (grown, shrunk) = (exp_m1(-d), exp_m1(depth));
         let (x_start, x_end) = (-grown.sqrt(), shrunk.sqrt());
         let chart =
             Chart::Turning { theta_h: turn.theta, ln_theta_h: turn.ln, x_start, x_end, x_squares: shrunk - grown };
         let arc = Arc { law, chart };
         let (start, end) = (arc.start()?, arc.end()?);
-        let (inner, outer) = (self.to.theta / end.excess, -gain * theta_s / start.excess);
+        let (inner, outer) = (self.to.theta / end.excess, -gain * leaving.theta_s / start.excess);
         let rate = Rate::Turning { gain, inner, outer, one_way: 0.0 };
-        Some(Extremal { time_at_floor, theta_s, late, lags: true, arc, start: start.ln_u, end: end.ln_u, rate })
+        Some(leaving.along(arc, start.ln_u, end.ln_u, rate))
     }
 
-    /// For a rising problem: where the arc starts, from `kappa = theta_1 (C - C_leaving(theta_1))`.
-    fn leaving(&self, kappa: f64) -> Leaving {
+    /// For a rising problem: the start and where it ends, `ln(theta_s/theta_1)`, from `kappa = theta_1 (C - C_leaving(theta_1))`.
+    fn leaving(&self, kappa: f64) -> (Leaving, f64) {
         let all = self.depth();
-        let at_once = Leaving { time_at_floor: 0.0, late: self.rest_beyond(), d: all };
+        let at_once = (self.at_once(), all);
         if !self.bounded {
             return at_once;
         }
@@ -446,7 +416,9 @@ impl Problem {
         }
         // 1 - theta_s comes from theta_1: it is a small difference where v_f is near 1.
         let left = -self.to.theta * exp_m1(d);
-        Leaving { time_at_floor: floor::time(held, self.to.rest + left), late: self.growth_beyond(left), d }
+        let time_at_floor = floor::time(held, self.to.rest + left);
+        let theta_s = if time_at_floor > 0.0 { self.to.theta * exp(d) } else { self.from.theta };
+        (Leaving { time_at_floor, theta_s, late: self.growth_beyond(left), lags: true }, d)
     }
 }
 
@@ -474,7 +446,7 @@ impl Extremal {
             (Chart::Turning { theta_h, ln_theta_h, x_end, x_squares, .. }, Rate::Ending { inner, .. })
                 if -x_squares > x_end * x_end =>
             {
-                let k = (1.0 + (b - a) * ln_theta_h + a - b) / theta_h;
+                let k = (steady_friction(&self.arc.law, ln_theta_h) + a - b) / theta_h;
                 let regular = if z == 0.0 { 1.0 } else { z / exp_m1(z) };
                 let outer = theta_h / (1.0 + x_end * x_end) * regular * pace / k;
                 Rate::Ending { gain: z * pace / k, inner, outer }
@@ -493,18 +465,21 @@ impl Extremal {
         }
     }
 
-    /// Derivative of the total time with respect to the parameter.
+    /// Derivative of the total time with respect to the parameter, from the `sums` over all free pieces, and over their `ends` of
+    /// `theta/(u - 1)`, that at the start of each less, and of [`Extremal::end_terms`]. The start and the end of the extremal are
+    /// among the pieces where `has` states so.
     #[inline(always)]
-    pub fn rate_of(&self, free: &FreeSums) -> f64 {
-        let inside = |gain: f64| gain * (free.sensitivity + free.ends);
+    pub fn rate_of(&self, sums: &Sums, ends: f64, has: [bool; 2]) -> f64 {
+        let &Sums { sensitivity, swing, .. } = sums;
+        let inside = |gain: f64| gain * (sensitivity + ends);
         match self.rate {
-            Rate::Turning { one_way, .. } if !free.at_start && one_way != 0.0 => one_way * free.swing,
+            Rate::Turning { one_way, .. } if !has[0] && one_way != 0.0 => one_way * swing,
             Rate::Floor { gain, outer, .. } | Rate::Turning { gain, outer, .. } => {
-                inside(gain) + if free.at_start { outer } else { 0.0 }
+                inside(gain) + if has[0] { outer } else { 0.0 }
             }
-            Rate::Ending { gain, outer, .. } => inside(gain) + if free.at_end { outer } else { 0.0 },
-            Rate::Direct { gain } => gain * free.sensitivity,
-            Rate::OneWay { gain } => gain * free.swing,
+            Rate::Ending { gain, outer, .. } => inside(gain) + if has[1] { outer } else { 0.0 },
+            Rate::Direct { gain } => gain * sensitivity,
+            Rate::OneWay { gain } => gain * swing,
         }
     }
 
@@ -513,8 +488,7 @@ impl Extremal {
     pub fn probe(&self, problem: &Problem, sums: &Sums, beyond: f64) -> Probe {
         let time = self.time_beyond(sums);
         let [start, end] = self.end_terms();
-        let &Sums { sensitivity, swing, .. } = sums;
-        let rate = self.rate_of(&FreeSums { sensitivity, ends: start + end, swing, at_start: true, at_end: true });
+        let rate = self.rate_of(sums, start + end, [true; 2]);
         let (value, slope) = if let Rate::Floor { .. } = self.rate {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {
@@ -529,8 +503,7 @@ impl Extremal {
 /// `d time/dX` at an end of the turning chart: `2 theta_h X/((1 + X^2)^2 (u - 1))`, regular at `X = 0`.
 fn edge(law: &Law, theta_h: f64, ln_theta_h: f64, x: f64, at: &Turning) -> f64 {
     let grow = 1.0 + x * x;
-    let c_h = 1.0 + (law.b - law.a) * ln_theta_h;
-    2.0 * theta_h / (grow * grow * super::arc::omega(law, c_h, x * x) * at.slope)
+    2.0 * theta_h / (grow * grow * omega(law, steady_friction(law, ln_theta_h), x * x) * at.slope)
 }
 
 /// Whether the turning point can be within a factor of two: a bound that costs no logarithm.

@@ -11,24 +11,21 @@ use crate::numerics::elementary::{exp, ln};
 /// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
 pub fn feasible_times(transition: &Transition, bounds: impl Into<Bounds>) -> Option<(f64, f64)> {
     let (problem, ceilings) = posed(transition, 1.0, &bounds.into())?;
-    match feasible(&problem, &ceilings) {
-        Feasible::Times(least, most) => Some((least, most)),
-        Feasible::Sitting(least) => Some((least, f64::INFINITY)),
-        Feasible::Never(_) => None,
-    }
+    feasible(&problem, &ceilings).times()
 }
 
 /// Why a protocol is infeasible; `None` for a feasible one.
 pub fn obstacle(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Option<Obstacle> {
     let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return Some(Obstacle::Domain) };
-    let (t_least, t_most) = match feasible(&problem, &ceilings) {
-        Feasible::Times(least, most) => (least, most),
-        Feasible::Sitting(least) => (least, f64::INFINITY),
-        Feasible::Never(ArcKind::VCeiling) => {
-            return Some(Obstacle::VCeiling { above: lowest_v(&problem, transition) });
-        }
-        Feasible::Never(_) => return Some(Obstacle::TauCeiling { above: lowest_tau(&problem) }),
-    };
+    let found = feasible(&problem, &ceilings);
+    if let Feasible::Never(kind) = found {
+        return Some(if kind == ArcKind::VCeiling {
+            Obstacle::VCeiling { above: lowest_v(&problem, transition) }
+        } else {
+            Obstacle::TauCeiling { above: lowest_tau(&problem) }
+        });
+    }
+    let (t_least, t_most) = found.times()?;
     if t_f < t_least || (t_f == t_least && !problem.bounded && problem.rises()) {
         Some(Obstacle::TooFast { t_least })
     } else {
@@ -95,13 +92,11 @@ pub fn least_tau_ceiling(transition: &Transition, t_f: f64, bounds: impl Into<Bo
 
 /// The least ceiling, found by `root`, unless no ceiling allows `t_f`, or steady sliding on the ceiling does.
 fn least(problem: &Problem, t_f: f64, without: &Ceilings, steady: f64, root: impl FnOnce() -> f64) -> Option<f64> {
-    match feasible(problem, without) {
-        Feasible::Never(_) => None,
-        Feasible::Times(least, most) if t_f < least || t_f > most => None,
-        Feasible::Sitting(least) if t_f < least => None,
-        _ if problem.fall == 0.0 => Some(steady),
-        _ => Some(root()),
+    let (least, most) = feasible(problem, without).times()?;
+    if t_f < least || t_f > most {
+        return None;
     }
+    Some(if problem.fall == 0.0 { steady } else { root() })
 }
 
 /// The ceiling, by a place that rises with it, on which the limit of the time is `t_f`; the search starts at a place with a

@@ -2,6 +2,7 @@
 
 use super::arc::ArcPoint;
 use super::ceiling::Ceilings;
+use super::clamp::Path;
 use super::constrained::{self, Constrained};
 use super::extremal::Problem;
 use super::guess::Guess;
@@ -10,7 +11,7 @@ use super::search::{self, Time};
 use super::{ArcKind, Bounds, FeedbackPoint, INFEASIBLE, Optimum, Strategy, slopes};
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
-use crate::numerics::elementary::{exp, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::{Motion, Solved, SolverStats, Status};
 
 /// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
@@ -25,16 +26,13 @@ pub fn feedback_at(
     bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> Solved<FeedbackPoint> {
-    let failed = |status, stats| Solved { status, value: None, stats };
-    let bounds = bounds.into();
-    let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else {
-        return failed(Status::Infeasible, SolverStats::default());
+    let Some((problem, ceilings)) = posed(law, theta, t_left, v_f, &bounds.into()) else {
+        return Solved::without_numbers(Status::Infeasible, SolverStats::default());
     };
-    let ceilings = Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), &bounds);
     let Constrained { solved, path, sitting } =
         constrained::find(&problem, &ceilings, Time::since(&problem, t_left), rtol);
     let Solved { status, value, stats } = solved;
-    let Some(optimum) = value else { return failed(status, stats) };
+    let Some(optimum) = value else { return Solved::without_numbers(status, stats) };
     let tolerance = search::quadrature_tolerance(rtol);
     let point = match &path {
         Some(path) => {
@@ -48,35 +46,37 @@ pub fn feedback_at(
         // Without a path it is steady sliding, or the floor to the end: with less theta no protocol arrives.
         None => sitting.map(|sitting| ((problem.friction_end() + law.a) / theta, 0.0, sitting.kind)),
     };
-    let Some((costate, gain, arc)) = point else { return failed(Status::Infeasible, stats) };
+    let Some((costate, gain, arc)) = point else {
+        return Solved::without_numbers(Status::Infeasible, stats);
+    };
     let value = FeedbackPoint { v: optimum.v_start, work_to_go: optimum.work, costate, gain, arc };
     Solved { status, value: Some(value), stats }
 }
 
 /// The gain before a wait at the end: `C` is that of the turn, whatever theta.
-fn waiting_gain(problem: &Problem, path: &super::clamp::Path) -> Option<f64> {
+fn waiting_gain(problem: &Problem, path: &Path) -> Option<f64> {
     if path.extremal.time_at_floor > 0.0 {
         return Some(0.0);
     }
     let Law { a, b } = problem.law;
     let ArcPoint { theta, ln_u: z, .. } = path.pieces().next()?.ends()[0];
-    let friction = 1.0 + a * z + (b - a) * crate::numerics::elementary::ln(theta);
-    let excess = crate::numerics::elementary::exp_m1(z);
+    let friction = 1.0 + a * z + (b - a) * ln(theta);
+    let excess = exp_m1(z);
     Some(-exp(z) / theta / excess * (friction - b + a) / (a * theta))
 }
 
-/// The problem from `theta` to steady sliding at `v_f`; `None` outside the domain.
-fn posed(law: Law, theta: f64, t_left: f64, v_f: f64, bounds: &Bounds) -> Option<Problem> {
+/// The problem from `theta` to steady sliding at `v_f`, and its ceilings; `None` outside the domain.
+fn posed(law: Law, theta: f64, t_left: f64, v_f: f64, bounds: &Bounds) -> Option<(Problem, Ceilings)> {
     let numbers = [law.a, law.b, theta, t_left, v_f].iter().all(|x| x.is_finite());
     let inside = law.a > 0.0 && law.b >= 0.0 && theta > 0.0 && t_left > 0.0 && v_f > 1.0;
     let young = theta < 1.0 || !bounds.floor;
-    (numbers && inside && young && bounds.is_valid()).then(|| Problem {
-        law,
-        from: Lifetime::with(theta, 1.0 - theta),
-        to: Lifetime::steady(v_f),
-        fall: (DoubleDouble::product(theta, v_f) + DoubleDouble::new(-1.0)).high,
-        bounded: bounds.floor,
-    })
+    if !(numbers && inside && young && bounds.is_valid()) {
+        return None;
+    }
+    let fall = (DoubleDouble::product(theta, v_f) + DoubleDouble::new(-1.0)).high;
+    let (from, to) = (Lifetime::with(theta, 1.0 - theta), Lifetime::steady(v_f));
+    let problem = Problem { law, from, to, fall, bounded: bounds.floor };
+    Some((problem, Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), bounds)))
 }
 
 /// The optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`, and its motion.
@@ -88,9 +88,8 @@ pub fn motion_from(
     bounds: impl Into<Bounds>,
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
-    let bounds = bounds.into();
-    let Some(problem) = posed(law, theta, t_left, v_f, &bounds) else { return (INFEASIBLE, None) };
-    super::motion_of(&problem, &Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), &bounds), t_left, rtol)
+    let Some((problem, ceilings)) = posed(law, theta, t_left, v_f, &bounds.into()) else { return (INFEASIBLE, None) };
+    super::motion_of(&problem, &ceilings, t_left, rtol)
 }
 
 /// The optimal feedback: velocity and multipliers.
@@ -150,7 +149,7 @@ pub fn feedback(
     };
     let rounding = ROUNDINGS * f64::EPSILON * size;
     let beyond = if bounded && beyond <= rounding { 0.0 } else { beyond };
-    let time = search::Time { whole: time_left, beyond, doubt: rounding / beyond };
+    let time = Time { whole: time_left, beyond, doubt: rounding / beyond };
     let (solved, member) = search::free(&problem, time, rtol, &Guess::of(&problem, time.beyond));
     *stats += solved.stats;
     let optimum = solved.value?;

@@ -57,28 +57,13 @@ pub enum Strategy {
 }
 
 impl Strategy {
-    /// All strategies, in their order.
-    pub const ALL: [Strategy; 7] = [
-        Strategy::SpeedUp,
-        Strategy::SlowDown,
-        Strategy::Floor,
-        Strategy::WaitJerk,
-        Strategy::JerkWait,
-        Strategy::Chatter,
-        Strategy::Rise,
-    ];
+    /// The names in tables, in the order of the strategies.
+    pub const NAMES: [&'static str; 7] =
+        ["speed_up", "slow_down", "floor", "wait_jerk", "jerk_wait", "chatter", "rise"];
 
-    /// The name that is written into tables.
+    /// The name in tables.
     pub fn name(self) -> &'static str {
-        match self {
-            Strategy::SpeedUp => "speed_up",
-            Strategy::SlowDown => "slow_down",
-            Strategy::Floor => "floor",
-            Strategy::WaitJerk => "wait_jerk",
-            Strategy::JerkWait => "jerk_wait",
-            Strategy::Chatter => "chatter",
-            Strategy::Rise => "rise",
-        }
+        Strategy::NAMES[self as usize]
     }
 }
 
@@ -139,17 +124,12 @@ pub enum ArcKind {
 }
 
 impl ArcKind {
-    /// All kinds, in their order.
-    pub const ALL: [ArcKind; 4] = [ArcKind::Free, ArcKind::Floor, ArcKind::VCeiling, ArcKind::TauCeiling];
+    /// The names in tables, in the order of the kinds.
+    pub const NAMES: [&'static str; 4] = ["free", "floor", "v_ceiling", "tau_ceiling"];
 
     /// The name in tables.
     pub fn name(self) -> &'static str {
-        match self {
-            ArcKind::Free => "free",
-            ArcKind::Floor => "floor",
-            ArcKind::VCeiling => "v_ceiling",
-            ArcKind::TauCeiling => "tau_ceiling",
-        }
+        ArcKind::NAMES[self as usize]
     }
 }
 
@@ -211,7 +191,7 @@ pub fn solve(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>, rtol:
 }
 
 const INFEASIBLE: Solved<Optimum> =
-    Solved { status: Status::Infeasible, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } };
+    Solved::without_numbers(Status::Infeasible, SolverStats { quadratures: 0, nodes: 0 });
 
 /// The optimal protocol and the derivatives of its work; `None` at the least time of a deceleration.
 ///
@@ -270,7 +250,7 @@ fn motion_of(
     rtol: f64,
 ) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
     let found = constrained::find(problem, ceilings, Time::since(problem, t_f), rtol.min(MOTION_RTOL));
-    let motion = found.solved.value.map(|_| OptimalMotion::new(problem, ceilings, t_f, &found));
+    let motion = found.solved.value.map(|_| OptimalMotion::new(problem, t_f, &found));
     (found.solved, motion.map(|motion| Box::new(motion) as Box<dyn Motion>))
 }
 

@@ -16,7 +16,6 @@ use crate::protocol::{Moment, Motion};
 /// The motion along one path.
 pub(super) struct OptimalMotion {
     problem: Problem,
-    ceilings: Ceilings,
     t_f: f64,
     segments: Vec<Segment>,
     /// The coordinate at which each segment begins, and the end.
@@ -41,7 +40,7 @@ struct TimedCeiling {
 
 impl OptimalMotion {
     /// The motion of a solution in time `t_f`.
-    pub fn new(problem: &Problem, ceilings: &Ceilings, t_f: f64, found: &Constrained) -> OptimalMotion {
+    pub fn new(problem: &Problem, t_f: f64, found: &Constrained) -> OptimalMotion {
         let Constrained { path, sitting, .. } = found;
         let mut segments: Vec<Segment> = path.iter().flat_map(|path| path.pieces()).map(Segment::of).collect();
         segments.extend(sitting.map(Segment::Sitting));
@@ -65,33 +64,32 @@ impl OptimalMotion {
         for segment in &segments {
             edges.push(edges[edges.len() - 1] + segment.length());
         }
-        OptimalMotion { problem: *problem, ceilings: *ceilings, t_f, segments, edges }
+        OptimalMotion { problem: *problem, t_f, segments, edges }
     }
 
     fn moment(&self, segment: &Segment, place: f64) -> Moment {
-        let Law { a, b } = self.problem.law;
+        let law = &self.problem.law;
         match segment {
             Segment::Floor(floor) => floor.at(place),
             Segment::Free(arc) => {
                 let here = arc.pieces.at(place);
                 let v = exp(here.ln_u - here.ln_theta);
                 let on_bound = self.problem.bounded && v < 1.0 && v > 1.0 - ROUNDING;
-                let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
                 Moment {
                     t: arc.time(place),
                     v: if on_bound { 1.0 } else { v },
                     theta: here.theta,
-                    friction,
+                    friction: here.friction(law),
                     v_c: None,
-                    beta: Some(-costate_off_bounds(&self.problem.law, arc.c, &here)),
+                    beta: Some(-costate_off_bounds(law, arc.c, &here)),
                 }
             }
-            Segment::Ceiling(timed) => timed.moment(&self.ceilings, place),
+            Segment::Ceiling(timed) => timed.moment(place),
             Segment::Sitting(sitting) => {
                 let (theta, friction) = (self.problem.to.theta, self.problem.friction_end());
                 let pressed = sitting.multiplier(&self.problem, sitting.time * place).0;
                 let t = self.t_f - sitting.time * (1.0 - place);
-                let beta = Some(-(friction + a + pressed) / theta).filter(|beta| beta.is_finite());
+                let beta = Some(-(friction + law.a + pressed) / theta).filter(|beta| beta.is_finite());
                 Moment { t, v: 1.0 / theta, theta, friction, v_c: None, beta }
             }
         }
@@ -154,10 +152,10 @@ impl Segment {
 const MOST_PARTS: f64 = 500.0;
 
 impl TimedCeiling {
-    fn moment(&self, ceilings: &Ceilings, place: f64) -> Moment {
-        let Law { a, b } = ceilings.law;
+    fn moment(&self, place: f64) -> Moment {
         let arc = &self.arc;
-        let [before, after] = arc.cut(ceilings, place);
+        let Ceilings { law: Law { a, b }, v: v_ceiling, tau, .. } = arc.ceilings;
+        let [before, after] = arc.cut(place);
         let (gone, left) = (before.time(), after.time());
         let all = self.end - self.start;
         let t = if gone <= left {
@@ -169,11 +167,11 @@ impl TimedCeiling {
         let (depth, z) = (Depth { below: high.length, above: low.length }, high.z_lo);
         let theta = arc.theta_hi * exp(-depth.below);
         let of_v = arc.kind == ArcKind::VCeiling;
-        let friction = if of_v { 1.0 + a * ln(ceilings.v) + b * ln(theta) } else { ceilings.tau };
-        let pressed = if z == 0.0 { 0.0 } else { self.gap.value(depth) / exp_m1(z) };
+        let friction = if of_v { 1.0 + a * ln(v_ceiling) + b * ln(theta) } else { tau };
+        let pressed = if z == 0.0 { 0.0 } else { self.gap.value(arc, depth) / exp_m1(z) };
         Moment {
             t,
-            v: if of_v { ceilings.v } else { exp(z) / theta },
+            v: if of_v { v_ceiling } else { exp(z) / theta },
             theta,
             friction,
             v_c: None,
@@ -308,8 +306,7 @@ impl Timed {
     /// The arc from the time 0.
     pub fn new(arc: &Arc) -> Timed {
         let pieces = arc.pieces();
-        let edge = |piece: usize| piece as f64 / f64::from(pieces.count);
-        let times: Vec<f64> = (0..pieces.count as usize).map(|i| pieces.time(edge(i), edge(i + 1))).collect();
+        let times: Vec<f64> = pieces.edges().map(|[from, to]| pieces.time(from, to)).collect();
         let sums = |times: &mut dyn Iterator<Item = &f64>| {
             let mut sum = 0.0;
             let mut sums = vec![0.0];
@@ -338,9 +335,8 @@ impl Timed {
     /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their
     /// digits.
     pub fn time(&self, place: f64) -> f64 {
-        let count = f64::from(self.pieces.count);
-        let piece = ((place * count) as usize).min(self.pieces.count as usize - 1);
-        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        let piece = ((place * f64::from(self.pieces.count)) as usize).min(self.pieces.count as usize - 1);
+        let [from, to] = self.pieces.edges_of(piece);
         // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next.
         if self.gone[piece + 1] <= self.left[piece] {
             let gone = (self.gone[piece] + self.pieces.time(from, place)).min(self.gone[piece + 1]);

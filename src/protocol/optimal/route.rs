@@ -31,7 +31,6 @@ pub struct PathSegment {
 
 /// The free optimal protocol: the floor arc, then the free arc.
 pub struct Route {
-    law: Law,
     t_f: f64,
     floor: Floor,
     arc: Option<Timed>,
@@ -49,7 +48,7 @@ impl Route {
             arc
         });
         let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.start));
-        Route { law: problem.law, t_f, floor, arc }
+        Route { t_f, floor, arc }
     }
 
     /// Duration `t_f`.
@@ -95,14 +94,14 @@ impl Route {
             (PathPoint::Moving(_), None) => return self.held(self.t_f),
             (PathPoint::Held(time), _) => return self.held(time),
         };
-        let Law { a, b } = self.law;
+        let law = &self.floor.law;
+        let &Law { a, b } = law;
         let here = arc.pieces.at(place);
-        let theta = here.theta;
+        let (theta, friction) = (here.theta, here.friction(law));
         let v = exp(here.ln_u - here.ln_theta);
         let rate = -exp_m1(here.ln_u);
         // Derivatives of ln v = q, ln theta = y and friction, from q' = (tau + a - b)/(a theta) and theta' = 1 - theta
         // v.
-        let friction = 1.0 + a * here.ln_u + (b - a) * here.ln_theta;
         let y1 = rate / theta;
         let q1 = (friction + a - b) / (a * theta);
         let y2 = -(y1 / theta + v * q1);
@@ -127,11 +126,26 @@ impl Route {
         }
     }
 
+    /// Between two points: from which time to which on the floor arc, and from which place to which on the arc.
+    fn stretches(&self, from: PathPoint, to: PathPoint) -> (Option<[f64; 2]>, Option<(&Timed, [f64; 2])>) {
+        let held = match (from, to) {
+            (PathPoint::Held(start), PathPoint::Held(end)) => Some([start, end]),
+            (PathPoint::Held(start), PathPoint::Moving(_)) => Some([start, self.floor.time]),
+            (PathPoint::Moving(_), _) => None,
+        };
+        let places = match (from, to) {
+            (_, PathPoint::Held(_)) => None,
+            (PathPoint::Held(_), PathPoint::Moving(end)) => Some([0.0, end]),
+            (PathPoint::Moving(start), PathPoint::Moving(end)) => Some([start, end]),
+        };
+        (held, self.arc.as_ref().zip(places))
+    }
+
     /// Places between two, with them, between which the protocol is smooth and shows no detail much narrower.
     pub fn landmarks(&self, from: PathPoint, to: PathPoint) -> Vec<PathPoint> {
         let mut sites = vec![from];
-        if let PathPoint::Held(start) = from {
-            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
+        let (held, moving) = self.stretches(from, to);
+        if let Some([start, end]) = held {
             // Theta changes over its first value, and then over 1.
             let mut time = start;
             while time < end && sites.len() < MAX_MARKS {
@@ -139,12 +153,11 @@ impl Route {
                 sites.push(PathPoint::Held(time));
             }
         }
-        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            if let PathPoint::Held(_) = from {
+        if let Some((arc, [start, end])) = moving {
+            if held.is_some() {
                 sites.push(PathPoint::Moving(0.0));
             }
-            sites.extend(arc.parts(start, end).map(|(_, to)| PathPoint::Moving(to)));
+            sites.extend(arc.parts(start, end).map(|[_, to]| PathPoint::Moving(to)));
         }
         sites
     }
@@ -152,14 +165,13 @@ impl Route {
     /// Least friction between two places: at one of them, or in between if it falls below 0 there.
     pub fn friction_min(&self, from: PathPoint, to: PathPoint) -> f64 {
         let mut least = f64::INFINITY;
-        if let PathPoint::Held(start) = from {
+        let (law, (held, moving)) = (&self.floor.law, self.stretches(from, to));
+        if let Some([start, _]) = held {
             // It rises all the way.
-            least = 1.0 + self.law.b * self.floor.from.aged(start).ln;
+            least = 1.0 + law.b * self.floor.from.aged(start).ln;
         }
-        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            let (first, last) = (arc.pieces.at(start), arc.pieces.at(end));
-            least = least.min(friction_range(&self.law, arc.c, &[first, last])[0]);
+        if let Some((arc, ends)) = moving {
+            least = least.min(friction_range(law, arc.c, &ends.map(|place| arc.pieces.at(place)))[0]);
         }
         least
     }
@@ -167,16 +179,15 @@ impl Route {
     /// The work, time and slip from one point to a later one.
     pub fn span(&self, from: PathPoint, to: PathPoint) -> PathSegment {
         let mut span = PathSegment { time: 0.0, lag: 0.0, work: 0.0 };
-        if let PathPoint::Held(start) = from {
-            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
+        let (held, moving) = self.stretches(from, to);
+        if let Some([start, end]) = held {
             let (now, time) = (self.floor.from.aged(start), end - start);
             span.time += time;
             span.lag += lag_at_bound(now.theta, time);
-            span.work += floor::work(&self.law, now, time);
+            span.work += floor::work(&self.floor.law, now, time);
         }
-        if let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) {
-            let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
-            for (from, to) in arc.parts(start, end) {
+        if let Some((arc, [start, end])) = moving {
+            for [from, to] in arc.parts(start, end) {
                 let sums = arc.pieces.sums(from, to);
                 span.time += sums.time;
                 span.lag += sums.lag;
@@ -195,16 +206,12 @@ impl Route {
         extent: &mut ValueRange,
         moment: impl Fn(&Jet) -> [f64; 2],
     ) {
-        if let PathPoint::Held(start) = from {
-            // v_c = 1 + (b/k) theta'/theta falls all the way, and v rests.
-            let end = if let PathPoint::Held(end) = to { end } else { self.floor.time };
-            extent.add(moment(&self.held(start))[0]);
-            extent.add(moment(&self.held(end))[0]);
-        }
-        let (PathPoint::Moving(end), Some(arc)) = (to, &self.arc) else { return };
-        let start = if let PathPoint::Moving(start) = from { start } else { 0.0 };
+        let (held, moving) = self.stretches(from, to);
+        // v_c = 1 + (b/k) theta'/theta falls all the way, and v rests.
+        held.iter().flatten().for_each(|&time| extent.add(moment(&self.held(time))[0]));
+        let Some((arc, [start, end])) = moving else { return };
         let moment_at = |place| moment(&self.jet(PathPoint::Moving(place)));
-        for (from, to) in arc.parts(start, end) {
+        for [from, to] in arc.parts(start, end) {
             let mut before = (from, moment_at(from));
             extent.add(before.1[0]);
             for u in radau().u {
@@ -225,27 +232,21 @@ impl Route {
 
 impl Timed {
     /// The parts of `[from, to]` that lie in one piece each.
-    fn parts(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + use<'_> {
-        let count = f64::from(self.pieces.count);
-        let edge = move |piece: u32| f64::from(piece) / count;
-        (0..self.pieces.count)
-            .map(move |piece| (edge(piece).max(from), edge(piece + 1).min(to)))
-            .filter(|(from, to)| from < to)
+    fn parts(&self, from: f64, to: f64) -> impl Iterator<Item = [f64; 2]> {
+        self.pieces.edges().map(move |[first, last]| [first.max(from), last.min(to)]).filter(|[from, to]| from < to)
     }
 
     /// The place at a time after the start of the arc.
     fn place_after(&self, time: f64) -> f64 {
         let piece = self.gone.partition_point(|&gone| gone <= time).clamp(1, self.gone.len() - 1) - 1;
-        let count = f64::from(self.pieces.count);
-        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        let [from, to] = self.pieces.edges_of(piece);
         from + inverse(time - self.gone[piece], to - from, |d| self.pieces.time(from, from + d))
     }
 
     /// The place at a time before the end of the arc.
     fn place_before(&self, time: f64) -> f64 {
         let piece = self.left.partition_point(|&left| left > time).clamp(1, self.left.len() - 1) - 1;
-        let count = f64::from(self.pieces.count);
-        let (from, to) = (piece as f64 / count, (piece + 1) as f64 / count);
+        let [from, to] = self.pieces.edges_of(piece);
         to - inverse(time - self.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
     }
 }

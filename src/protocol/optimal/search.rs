@@ -44,8 +44,6 @@ pub(super) const FINEST: f64 = 1e-18;
 /// A family of paths in one parameter, in which the time is monotone.
 pub(super) trait Family {
     type Path: Copy;
-    /// An interval of the parameter in which the time is smooth.
-    type Piece: Copy + PartialEq;
 
     fn problem(&self) -> &Problem;
 
@@ -55,7 +53,8 @@ pub(super) trait Family {
     /// The path at a parameter; `None` where there is none.
     fn path(&self, p: f64) -> Option<Self::Path>;
 
-    fn piece(&self, p: f64, path: &Self::Path) -> Self::Piece;
+    /// The interval of the parameter in which the time is smooth, as a number.
+    fn piece(&self, p: f64, path: &Self::Path) -> u32;
 
     /// Quadrature to relative accuracy `tolerance`.
     fn measure(&self, path: &Self::Path, tolerance: f64) -> Option<Measured>;
@@ -66,13 +65,8 @@ pub(super) trait Family {
     /// Whether the slope of the time may jump where the parameter is 0.
     fn breaks_at_zero(&self) -> bool;
 
-    fn extremal(path: &Self::Path) -> &Extremal;
-
-    /// Work at the floor and on the ceilings, and the nodes that it takes.
-    fn bound_work(&self, path: &Self::Path) -> (f64, u32);
-
-    /// Reads a path with its pieces.
-    fn in_pieces<T>(&self, path: &Self::Path, read: impl FnOnce(&PathView) -> T) -> T;
+    /// The path with its pieces.
+    fn view<'a>(&self, path: &'a Self::Path) -> PathView<'a>;
 }
 
 /// What one quadrature finds.
@@ -111,7 +105,7 @@ pub(super) struct Search<'a, F: Family> {
     /// Tolerance of the next quadrature.
     tolerance: f64,
     /// The last path, its piece and what was measured.
-    last: Option<(F::Path, F::Piece, Measured)>,
+    last: Option<(F::Path, u32, Measured)>,
     stats: SolverStats,
     /// Least friction met at a node.
     friction_min: f64,
@@ -138,21 +132,22 @@ impl<'a, F: Family> Search<'a, F> {
         let (problem, mut stats) = (family.problem(), search.stats);
         let failure = || failure(problem, ceilings, search.friction_min);
         let Some(((p, path), (probed, _, measured))) = found.zip(last) else {
-            return (Solved { status: failure(), value: None, stats }, None);
+            return (Solved::without_numbers(failure(), stats), None);
         };
+        let (probed, path_view) = (family.view(&probed), family.view(&path));
         // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
         // order.
-        let c = F::extremal(&probed).arc.c() + F::extremal(&path).arc.c();
-        let (bound_work, nodes) = family.bound_work(&probed);
+        let c = probed.extremal.arc.c() + path_view.extremal.arc.c();
+        let (bound_work, nodes) = probed.bound_work(problem);
         stats.nodes += nodes;
         let work = bound_work + measured.work - 0.5 * c * measured.lag;
-        let read = family.in_pieces(&path, |path| read(problem, ceilings, path, work, measured.friction_min));
-        let (status, value) = read.unwrap_or_else(|| (failure(), None));
+        let (status, value) =
+            read(problem, ceilings, &path_view, work, measured.friction_min).unwrap_or_else(|| (failure(), None));
         (Solved { status, value, stats }, Some((path, p)))
     }
 
     #[inline(always)]
-    fn probe(&mut self, p: f64, fraction: f64) -> Option<(Probe, F::Piece)> {
+    fn probe(&mut self, p: f64, fraction: f64) -> Option<(Probe, u32)> {
         let path = self.family.path(p)?;
         let piece = self.family.piece(p, &path);
         let before = self.last.as_ref().filter(|(_, before, _)| *before == piece).map(|(.., last)| last.probe.value);
@@ -252,7 +247,7 @@ pub(super) fn free(problem: &Problem, time: Time, rtol: f64, guess: &Guess) -> F
     let Time { whole: t_f, beyond, doubt } = time;
     let stats = SolverStats::default();
     if beyond < 0.0 || beyond.is_nan() || (beyond == 0.0 && !problem.bounded) {
-        return (Solved { status: Status::Infeasible, value: None, stats }, None);
+        return (Solved::without_numbers(Status::Infeasible, stats), None);
     }
     if beyond == 0.0 {
         return (shortest(problem, problem.t_min()), None);
@@ -399,19 +394,8 @@ struct Extremals<'a> {
     beyond: f64,
 }
 
-/// An interval of the parameter in which the time is smooth.
-#[derive(Clone, Copy, PartialEq)]
-struct SmoothInterval {
-    /// Beyond `q_floor`.
-    beyond: bool,
-    /// Beyond `q = 0`.
-    turned: bool,
-    held: bool,
-}
-
 impl Family for Extremals<'_> {
     type Path = Extremal;
-    type Piece = SmoothInterval;
 
     fn problem(&self) -> &Problem {
         self.problem
@@ -425,9 +409,10 @@ impl Family for Extremals<'_> {
         self.problem.extremal(p, self.q_floor)
     }
 
-    fn piece(&self, p: f64, path: &Extremal) -> SmoothInterval {
-        let q_floor = self.q_floor.unwrap_or(0.0);
-        SmoothInterval { beyond: p > 0.0, turned: p + q_floor > 0.0, held: path.time_at_floor > 0.0 }
+    /// The seams are `q_floor`, `q = 0` and the start of a floor arc.
+    fn piece(&self, p: f64, path: &Extremal) -> u32 {
+        let beyond = [p > 0.0, p + self.q_floor.unwrap_or(0.0) > 0.0, path.time_at_floor > 0.0];
+        beyond.into_iter().fold(0, |sum, is_beyond| 2 * sum + u32::from(is_beyond))
     }
 
     fn measure(&self, path: &Extremal, tolerance: f64) -> Option<Measured> {
@@ -451,17 +436,9 @@ impl Family for Extremals<'_> {
         self.q_floor.is_some()
     }
 
-    fn extremal(path: &Extremal) -> &Extremal {
-        path
-    }
-
-    fn bound_work(&self, path: &Extremal) -> (f64, u32) {
-        (floor::work(&self.problem.law, self.problem.from, path.time_at_floor), 0)
-    }
-
     #[inline(always)]
-    fn in_pieces<T>(&self, path: &Extremal, read: impl FnOnce(&PathView) -> T) -> T {
-        PathView::of_free(self.problem, path, read)
+    fn view<'a>(&self, path: &'a Extremal) -> PathView<'a> {
+        PathView::of_free(self.problem, path)
     }
 }
 

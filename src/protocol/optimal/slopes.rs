@@ -1,6 +1,6 @@
 //! Derivatives of the least work along a path (envelope theorem), the costate and the gain of the feedback law.
 
-use super::arc::{ArcPoint, Chart, omega};
+use super::arc::{ArcPoint, Chart, omega, steady_friction};
 use super::clamp::{ClampedPiece, Path};
 use super::constrained::Sitting;
 use super::extremal::Problem;
@@ -98,8 +98,8 @@ fn pressure(law: Law, c: f64, piece: &ClampedPiece, at_end: bool) -> f64 {
     match piece {
         ClampedPiece::Free { .. } => costate_off_bounds(&law, c, &at),
         ClampedPiece::Ceiling { arc, gap } => {
-            let friction = 1.0 + law.a * at.ln_u + (law.b - law.a) * at.ln_theta;
-            (friction + law.a - gap.value(arc.end(arc.falls() != at_end)) / exp_m1(at.ln_u)) / at.theta
+            let gap = gap.value(arc, arc.end(arc.falls() != at_end));
+            (at.friction(&law) + law.a - gap / exp_m1(at.ln_u)) / at.theta
         }
     }
 }
@@ -124,7 +124,8 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
         return Some(0.0);
     }
     let first = path.pieces().next()?;
-    let ArcPoint { theta, ln_theta, ln_u: z } = first.ends()[0];
+    let start = first.ends()[0];
+    let ArcPoint { theta, ln_u: z, .. } = start;
     let v = exp(z) / theta;
     match first.kind() {
         ArcKind::VCeiling => return Some(0.0),
@@ -140,13 +141,13 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
             swing += sums.swing;
         }
     }
-    let friction = 1.0 + a * z + (b - a) * ln_theta;
+    let friction = start.friction(&problem.law);
     match path.extremal.arc.chart {
         Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares }
             if x_start * x_end <= 0.0 || x_squares.abs() > x_start.abs().min(x_end.abs()).powi(2) =>
         {
             // C of the turning point changes by k d ln theta_h; X/(u - 1) is regular at the turn.
-            let c_h = 1.0 + (b - a) * ln_theta_h;
+            let c_h = steady_friction(&problem.law, ln_theta_h);
             let k = (c_h + a - b) / theta_h;
             let omega = omega(&problem.law, c_h, x_start * x_start);
             let turned = x_start / (omega * turning(x_start * omega).slope);

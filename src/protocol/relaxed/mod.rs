@@ -18,7 +18,7 @@ use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
 use bound_arc::{BoundArc, Kind};
 pub use motion::PULSES;
 use price::Cheapest;
-use state::{State, down, jerk, up, wait};
+use state::{Loop, State, down, jerk, up, wait};
 
 /// The optimum of the convexified problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +61,7 @@ struct Problem {
 
 /// Outcomes without numbers.
 const fn without(status: Status) -> Solved<Relaxed> {
-    Solved { status, value: None, stats: SolverStats { quadratures: 0, nodes: 0 } }
+    Solved::without_numbers(status, SolverStats { quadratures: 0, nodes: 0 })
 }
 
 /// The relaxed optimum for `law`, which is not [`StateLaw::Ageing`], to rounding.
@@ -71,28 +71,39 @@ const fn without(status: Status) -> Solved<Relaxed> {
 /// and, besides, not above `v_f` or below the start of a rise.
 /// `NegativeFriction` where `tau < 0` on the path.
 pub fn solve(law: StateLaw, transition: &Transition, t_f: f64, v_ceiling: f64) -> Solved<Relaxed> {
+    find(law, transition, t_f, v_ceiling).0
+}
+
+/// The outcome of [`solve`]; with numbers also the problem and its path.
+fn find(
+    law: StateLaw,
+    transition: &Transition,
+    t_f: f64,
+    v_ceiling: f64,
+) -> (Solved<Relaxed>, Option<(Problem, Path)>) {
     let problem = match Problem::new(law, transition, v_ceiling) {
         Ok(problem) if t_f > 0.0 && t_f.is_finite() => problem,
-        Ok(_) => return without(Status::Infeasible),
-        Err(status) => return without(status),
+        Ok(_) => return (without(Status::Infeasible), None),
+        Err(status) => return (without(status), None),
     };
     if t_f < problem.least_time() {
-        return without(Status::Infeasible);
+        return (without(Status::Infeasible), None);
     }
-    match problem.path(t_f) {
+    let path = problem.path(t_f);
+    let solved = match &path {
         Some(path) => path.solved(&problem, t_f),
         // The price may be negative or infinite there.
         None if !problem.is_proven(t_f) || problem.from.v > v_ceiling => without(Status::Unproven),
         None => without(Status::NotConverged),
-    }
+    };
+    (solved, path.filter(|_| solved.value.is_some()).map(|path| (problem, path)))
 }
 
 /// The derivatives of the work of [`solve`], those that do not exist infinite or NaN; `None` without an optimum.
 pub fn slopes(law: StateLaw, transition: &Transition, t_f: f64, v_ceiling: f64) -> Option<Slopes> {
-    let problem = Problem::new(law, transition, v_ceiling).ok()?;
-    let path = problem.path(t_f)?;
-    let hamiltonian = path.solved(&problem, t_f).value?.optimum.hamiltonian;
-    Some(slopes::of_path(&path, &problem, hamiltonian))
+    let (solved, found) = find(law, transition, t_f, v_ceiling);
+    let (problem, path) = found?;
+    Some(slopes::of_path(&path, &problem, solved.value?.optimum.hamiltonian))
 }
 
 /// The least ceiling under which an acceleration may last for `t_f`; `None` for a deceleration.
@@ -128,11 +139,9 @@ pub fn motion(
     t_f: f64,
     v_ceiling: f64,
 ) -> (Solved<Relaxed>, Option<Box<dyn Motion>>) {
-    let solved = solve(law, transition, t_f, v_ceiling);
-    let Ok(problem) = Problem::new(law, transition, v_ceiling) else { return (solved, None) };
-    let path = solved.value.and_then(|_| problem.path(t_f));
-    let motion = path.map(|path| Box::new(motion::BangBang::new(&problem, &path, t_f)) as Box<dyn Motion>);
-    (solved, motion)
+    let (solved, found) = find(law, transition, t_f, v_ceiling);
+    let motion = |(problem, path)| Box::new(motion::BangBang::new(&problem, &path, t_f)) as Box<dyn Motion>;
+    (solved, found.map(motion))
 }
 
 /// Error bound of the work: all is in closed form, but for rounding.
@@ -157,10 +166,8 @@ const MAX_AMPLIFICATION: f64 = 1e8;
 /// A path of the relaxed problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Path {
-    /// Two arcs with a turn between them.
-    Turn { first: BoundArc, second: BoundArc },
-    /// Two arcs and chattering between them, for this time.
-    Chatter { first: BoundArc, second: BoundArc, time: f64 },
+    /// Two arcs on bounds, with chattering between them for this time; 0 for a turn.
+    OnBounds { arcs: [BoundArc; 2], chatter: f64 },
     /// Faster than at `v = 1`, then at `v = 1`.
     Rise(rise::Rise),
 }
@@ -232,23 +239,25 @@ impl Problem {
         if spare < 0.0 {
             return rise::Rise::new(self, t_f).filter(|rise| rise.v_start() <= self.ceiling).map(Path::Rise);
         }
-        match self.cheapest() {
+        let arcs = match self.cheapest() {
             // No path returns to the steady state of the ceiling.
             _ if self.from.excess == 0.0 && self.to.excess == 0.0 => self.fall_and_wait(spare),
             Cheapest::Floor => self.wait_and_jerk(spare),
             Cheapest::Ceiling => self.fall_and_wait(spare),
             Cheapest::At(state) => {
-                let (first, second) = (self.arc(&self.from, &state), self.arc(&state, &self.to));
-                let time = t_f - (first.time(self.ceiling) + second.time(self.ceiling));
-                if time > 0.0 {
-                    Some(Path::Chatter { first, second, time })
-                } else if state.v < self.from.v.min(self.to.v) || self.from.v > self.ceiling {
+                let arcs = [self.arc(&self.from, &state), self.arc(&state, &self.to)];
+                let chatter = t_f - (arcs[0].time(self.ceiling) + arcs[1].time(self.ceiling));
+                if chatter > 0.0 {
+                    return Some(Path::OnBounds { arcs, chatter });
+                }
+                if state.v < self.from.v.min(self.to.v) || self.from.v > self.ceiling {
                     self.wait_and_jerk(spare)
                 } else {
                     self.fall_and_wait(spare)
                 }
             }
-        }
+        };
+        Some(Path::OnBounds { arcs: arcs?, chatter: 0.0 })
     }
 
     /// The arc between two states at which a law other than that of slip may chatter.
@@ -262,7 +271,7 @@ impl Problem {
     }
 
     /// First up at `v = 1`, then down on the ceiling: `spare` is the duration of the loop above the higher of both ends.
-    fn wait_and_jerk(&self, spare: f64) -> Option<Path> {
+    fn wait_and_jerk(&self, spare: f64) -> Option<[BoundArc; 2]> {
         let (ceiling, rises) = (self.ceiling, self.rises());
         let base = if rises { &self.to } else { &self.from };
         let whole = up(self.law, base, ceiling, spare);
@@ -276,20 +285,11 @@ impl Problem {
         let slip = if most > 0.0 { newton(probe, start, (0.0, most), true, LAST_STEP_RESIDUAL)?.x } else { 0.0 };
         let time = (spare - slip / ceiling).max(0.0);
         let found = up(self.law, base, ceiling, time);
-        let (more_time, more_slip) = if rises { (self.direct(), 0.0) } else { (0.0, self.direct()) };
-        let (span_up, span_down) =
-            if rises { (found.span + self.span, found.span) } else { (found.span, found.span + self.span) };
-        let ends = [self.from, found.turn];
-        let first = BoundArc { kind: Kind::Wait, length: more_time + time, ends, span: span_up };
-        let ends = [found.turn, self.to];
-        Some(Path::Turn {
-            first,
-            second: BoundArc { kind: Kind::Jerk, length: slip + more_slip, ends, span: span_down },
-        })
+        Some(self.around(&found, [(Kind::Wait, time), (Kind::Jerk, slip)]))
     }
 
     /// First down on the ceiling, then up at `v = 1`: `spare` is the duration of the loop below the lower of both ends.
-    fn fall_and_wait(&self, spare: f64) -> Option<Path> {
+    fn fall_and_wait(&self, spare: f64) -> Option<[BoundArc; 2]> {
         let (ceiling, rises) = (self.ceiling, self.rises());
         let base = if rises { &self.from } else { &self.to };
         let probe = |slip: f64| {
@@ -309,15 +309,17 @@ impl Problem {
         };
         let slip = if spare > 0.0 { newton(probe, start, bracket, true, LAST_STEP_RESIDUAL)?.x } else { 0.0 };
         let found = down(self.law, base, ceiling, slip);
-        let (more_time, more_slip) = if rises { (self.direct(), 0.0) } else { (0.0, self.direct()) };
-        let (span_down, span_up) =
-            if rises { (found.span, found.span + self.span) } else { (found.span + self.span, found.span) };
-        let ends = [self.from, found.turn];
-        let first = BoundArc { kind: Kind::Jerk, length: slip + more_slip, ends, span: span_down.abs() };
-        let ends = [found.turn, self.to];
-        Some(Path::Turn {
-            first,
-            second: BoundArc { kind: Kind::Wait, length: more_time + found.back, ends, span: span_up },
+        Some(self.around(&found, [(Kind::Jerk, slip), (Kind::Wait, found.back)]))
+    }
+
+    /// The arcs of a loop with their lengths; the direct way joins that on its bound.
+    fn around(&self, Loop { turn, span, .. }: &Loop, order: [(Kind, f64); 2]) -> [BoundArc; 2] {
+        let ends = [[self.from, *turn], [*turn, self.to]];
+        [0, 1].map(|place| {
+            let ((kind, length), ends) = (order[place], ends[place]);
+            let is_direct = self.rises() == (kind == Kind::Wait);
+            let (more, farther) = if is_direct { (self.direct(), self.span) } else { (0.0, 0.0) };
+            BoundArc { kind, length: length + more, ends, span: (span + farther).abs() }
         })
     }
 
@@ -331,18 +333,10 @@ impl Problem {
             return true;
         }
         let spare = t_f - self.direct_time();
-        let lowest = match self.fall_and_wait(spare.max(0.0)) {
-            _ if spare <= 0.0 => {
-                if self.rises() {
-                    self.from
-                } else {
-                    self.to
-                }
-            }
-            Some(Path::Turn { first, .. }) => first.ends[1],
-            _ => return false,
-        };
-        self.is_proven_down_to(&lowest)
+        if spare <= 0.0 {
+            return self.is_proven_down_to(if self.rises() { &self.from } else { &self.to });
+        }
+        self.fall_and_wait(spare).is_some_and(|[fall, _]| self.is_proven_down_to(&fall.ends[1]))
     }
 }
 
@@ -350,10 +344,7 @@ impl Path {
     /// The numbers of the path.
     fn solved(&self, problem: &Problem, t_f: f64) -> Solved<Relaxed> {
         let ((relaxed, least), stats) = match self {
-            Path::Turn { first, second } => (of_turn(problem, first, second), SolverStats::default()),
-            Path::Chatter { first, second, time } => {
-                (of_chatter(problem, (first, second), *time, t_f), SolverStats::default())
-            }
+            Path::OnBounds { arcs, chatter } => (on_bounds(problem, arcs, *chatter, t_f), SolverStats::default()),
             Path::Rise(rise) => rise.numbers(problem),
         };
         let status = if problem.is_proven(t_f) { Status::Ok } else { Status::Unproven };
@@ -364,55 +355,49 @@ impl Path {
     }
 }
 
-/// The numbers of a path with one turn, and its least friction.
-fn of_turn(problem: &Problem, first: &BoundArc, second: &BoundArc) -> (Relaxed, f64) {
-    let (arcs, turn) = ([*first, *second], first.ends[1]);
-    let [floor, ceiling] = bound_arc::times(&arcs, problem.ceiling);
-    let friction = bound_arc::friction(&arcs, problem);
+/// The numbers of two arcs on bounds between which it chatters for this time, and their least friction.
+fn on_bounds(problem: &Problem, arcs: &[BoundArc; 2], chatter: f64, t_f: f64) -> (Relaxed, f64) {
+    let [first, second] = arcs;
+    let turn = first.ends[1];
+    let [floor, ceiling] = bound_arc::times(arcs, problem.ceiling);
+    let [least, greatest] = bound_arc::friction(arcs, problem);
     let velocity = |arc: &BoundArc, other: &BoundArc| {
         if arc.length > 0.0 { arc.velocity(problem) } else { other.velocity(problem) }
     };
+    let price = problem.price(&turn);
     let optimum = Optimum {
-        work: bound_arc::work(&arcs, problem),
+        work: bound_arc::work(arcs, problem),
         v_start: velocity(first, second),
         v_end: velocity(second, first),
         time_at_floor: floor,
         time_at_v_ceiling: ceiling,
         time_at_tau_ceiling: 0.0,
-        hamiltonian: problem.price(&turn),
+        hamiltonian: price,
         theta_max: turn.theta.max(problem.from.theta).max(problem.to.theta),
-        friction_max: friction[1],
+        friction_max: greatest,
         strategy: if first.kind == Kind::Wait { Strategy::WaitJerk } else { Strategy::JerkWait },
     };
-    (Relaxed { optimum, chatter: None }, friction[0])
-}
-
-/// The numbers of a path that chatters for `time`, and its least friction.
-fn of_chatter(problem: &Problem, (first, second): (&BoundArc, &BoundArc), time: f64, t_f: f64) -> (Relaxed, f64) {
-    let (arcs, rest) = ([*first, *second], first.ends[1]);
-    let [floor, ceiling] = bound_arc::times(&arcs, problem.ceiling);
-    let (price, duty) = (problem.price(&rest), problem.duty(&rest));
+    if chatter == 0.0 {
+        return (Relaxed { optimum, chatter: None }, least);
+    }
+    let duty = problem.duty(&turn);
     // Both bounds occur at the state of chattering.
-    let pulses = [Kind::Wait, Kind::Jerk].map(|kind| BoundArc { kind, length: 1.0, ends: [rest; 2], span: 0.0 });
-    let [before, there] = [&arcs, &pulses].map(|arcs| bound_arc::friction(arcs, problem));
+    let pulses = [Kind::Wait, Kind::Jerk].map(|kind| BoundArc { kind, length: 1.0, ends: [turn; 2], span: 0.0 });
+    let there = bound_arc::friction(&pulses, problem);
     let spare = (t_f - problem.direct_time()).max(0.0);
-    let works = [problem.wait_and_jerk(spare), problem.fall_and_wait(spare)].map(|path| match path {
-        Some(Path::Turn { first, second }) => bound_arc::work(&[first, second], problem),
-        _ => f64::INFINITY,
-    });
+    let works = [problem.wait_and_jerk(spare), problem.fall_and_wait(spare)]
+        .map(|arcs| arcs.map_or(f64::INFINITY, |arcs| bound_arc::work(&arcs, problem)));
     let velocity = |arc: &BoundArc| if arc.length > 0.0 { arc.velocity(problem) } else { 1.0 };
     let optimum = Optimum {
-        work: bound_arc::work(&arcs, problem) + time * price,
+        work: optimum.work + chatter * price,
         v_start: velocity(first),
         v_end: velocity(second),
-        time_at_floor: floor + time * (1.0 - duty),
-        time_at_v_ceiling: ceiling + time * duty,
-        time_at_tau_ceiling: 0.0,
-        hamiltonian: price,
-        theta_max: rest.theta.max(problem.from.theta).max(problem.to.theta),
-        friction_max: before[1].max(there[1]),
+        time_at_floor: floor + chatter * (1.0 - duty),
+        time_at_v_ceiling: ceiling + chatter * duty,
+        friction_max: greatest.max(there[1]),
         strategy: Strategy::Chatter,
+        ..optimum
     };
-    let chatter = Chatter { time, theta: rest.theta, duty, work_bang_bang: works[0].min(works[1]) };
-    (Relaxed { optimum, chatter: Some(chatter) }, before[0].min(there[0]))
+    let chatter = Chatter { time: chatter, theta: turn.theta, duty, work_bang_bang: works[0].min(works[1]) };
+    (Relaxed { optimum, chatter: Some(chatter) }, least.min(there[0]))
 }

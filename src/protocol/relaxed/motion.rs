@@ -4,7 +4,7 @@ use super::bound_arc::{BoundArc, Kind};
 use super::rise::Rise;
 use super::state::{State, down, up};
 use super::{Path, Problem};
-use crate::numerics::elementary::exp;
+use crate::numerics::elementary::{exp, ln};
 use crate::protocol::{Moment, Motion};
 
 /// Pulses on the ceiling that stand for chattering. Chosen: they cost 1e-4 more work in the case of docs/laws.md.
@@ -16,8 +16,8 @@ const INTERVAL: f64 = 1.0;
 /// A piece of the motion.
 #[derive(Debug, Clone, Copy)]
 enum Piece {
-    /// An arc on a bound from a state.
-    Bound { kind: Kind, from: State, length: f64 },
+    /// An arc on a bound.
+    Bound(BoundArc),
     /// A rise of the slip law.
     Rise(Rise),
 }
@@ -35,33 +35,35 @@ impl BangBang {
     pub(super) fn new(problem: &Problem, path: &Path, t_f: f64) -> BangBang {
         let mut motion = BangBang { problem: *problem, t_f, pieces: Vec::new() };
         match path {
-            Path::Turn { first, second } => motion.extend([*first, *second]),
-            Path::Chatter { first, second, time } => {
-                motion.extend([*first]);
+            Path::OnBounds { arcs: [first, second], chatter } => {
+                motion.push(first);
                 let rest = first.ends[1];
                 let held = Problem { from: rest, to: rest, ratio: 0.0, span: 0.0, ..*problem };
-                if let Some(Path::Turn { first: pulse, second: back }) = held.wait_and_jerk(time / PULSES as f64) {
-                    (0..PULSES).for_each(|_| motion.extend([pulse, back]));
+                if *chatter > 0.0
+                    && let Some(pulse) = held.wait_and_jerk(chatter / PULSES as f64)
+                {
+                    (0..PULSES).for_each(|_| pulse.iter().for_each(|arc| motion.push(arc)));
                 }
-                motion.extend([*second]);
+                motion.push(second);
             }
             Path::Rise(rise) => {
                 let length = problem.from.below_floor - rise.end();
                 motion.pieces.push((Piece::Rise(*rise), 0.0, (length / INTERVAL) as u32 + 1));
                 let (v, time) = (exp(rise.end()), rise.wait(problem));
                 let from = State::steady(v, problem.ceiling);
-                motion.extend([BoundArc { kind: Kind::Wait, length: time, ends: [from, problem.to], span: 0.0 }]);
+                motion.push(&BoundArc { kind: Kind::Wait, length: time, ends: [from, problem.to], span: 0.0 });
             }
         }
         motion
     }
 
-    fn extend(&mut self, arcs: impl IntoIterator<Item = BoundArc>) {
-        for BoundArc { kind, length, ends: [from, to], .. } in arcs.into_iter().filter(|arc| arc.length > 0.0) {
+    /// Adds an arc, unless it is empty.
+    fn push(&mut self, arc: &BoundArc) {
+        let &BoundArc { length, ends: [from, to], .. } = arc;
+        if length > 0.0 {
             let change = (from.below_floor - to.below_floor).abs();
             let intervals = (((length + change) / INTERVAL) as u32).min(MAX_INTERVALS) + 1;
-            let start = self.end();
-            self.pieces.push((Piece::Bound { kind, from, length }, start, intervals));
+            self.pieces.push((Piece::Bound(*arc), self.end(), intervals));
         }
     }
 
@@ -72,8 +74,7 @@ impl BangBang {
 
     fn duration_of(&self, piece: &Piece) -> f64 {
         match piece {
-            Piece::Bound { kind: Kind::Wait, length, .. } => *length,
-            Piece::Bound { kind: Kind::Jerk, length, .. } => length / self.problem.ceiling,
+            Piece::Bound(arc) => arc.time(self.problem.ceiling),
             Piece::Rise(rise) => rise.time(&self.problem, rise.end()),
         }
     }
@@ -82,13 +83,12 @@ impl BangBang {
     fn inside(&self, piece: &Piece, fraction: f64) -> [f64; 3] {
         let Problem { law, ceiling, from: start, .. } = self.problem;
         match *piece {
-            Piece::Bound { kind: Kind::Wait, from, length } => {
-                let t = fraction * length;
-                [t, 1.0, up(law, &from, ceiling, t).turn.below_floor]
-            }
-            Piece::Bound { kind: Kind::Jerk, from, length } => {
-                let slip = fraction * length;
-                [slip / ceiling, ceiling, down(law, &from, ceiling, slip).turn.below_floor]
+            Piece::Bound(BoundArc { kind, length, ends: [from, _], .. }) => {
+                let part = fraction * length;
+                match kind {
+                    Kind::Wait => [part, 1.0, up(law, &from, ceiling, part).turn.below_floor],
+                    Kind::Jerk => [part / ceiling, ceiling, down(law, &from, ceiling, part).turn.below_floor],
+                }
             }
             Piece::Rise(rise) => {
                 let state = start.below_floor + fraction * (rise.end() - start.below_floor);
@@ -126,7 +126,7 @@ impl Motion for BangBang {
             along -= intervals;
         }
         let [t, v, below_floor] = found;
-        let direct = if v == 1.0 { 0.0 } else { self.problem.a * crate::numerics::elementary::ln(v) };
+        let direct = if v == 1.0 { 0.0 } else { self.problem.a * ln(v) };
         Moment {
             t: if s >= 1.0 { self.t_f } else { t },
             v,

@@ -12,11 +12,10 @@ use crate::protocol::optimal::Slopes;
 /// Derivatives of the least work of `path`, whose Hamiltonian is `hamiltonian`. Infinite or NaN where they do not exist.
 pub(super) fn of_path(path: &Path, problem: &Problem, hamiltonian: f64) -> Slopes {
     let (arcs, time) = match path {
-        Path::Turn { first, second } => ([*first, *second], 0.0),
-        Path::Chatter { first, second, time } => ([*first, *second], *time),
+        Path::OnBounds { arcs, chatter } => (arcs, *chatter),
         Path::Rise(rise) => return rise.slopes(problem),
     };
-    let [_, a, b] = bound_arc::terms(&arcs, problem);
+    let [_, a, b] = bound_arc::terms(arcs, problem);
     // The state at the turn, and what holding it costs for the time of chattering.
     let price = problem.price_slopes(&arcs[0].ends[1]);
     let [start, end] =
