@@ -1,8 +1,8 @@
 //! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
-use super::Verdict;
-use crate::dataset::Row;
-use crate::model::{Law, StateLaw};
+use super::CheckedRow;
+use super::friction::{Terms, terms};
+use crate::model::{Friction, Law, StateLaw};
 use crate::numerics::radau::{NODES, Nodes, radau};
 use crate::protocol::{Moment, Motion, SpringBlock};
 
@@ -37,6 +37,9 @@ const SLOPE_ROUNDING: f64 = 2e4 * f64::EPSILON;
 
 /// Rounding of a time in the slopes of a polynomial through sixteen of them. Chosen: four roundings for each value.
 const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Relative error of the times of regularised friction, whose extremal is found by its duration. Chosen: a hundredth of the default `rtol`.
+const REGULARISED_TIME_RTOL: f64 = 1e-12;
 
 /// Relative error of theta above which an interval may be split. Chosen: a hundredth of the default `rtol`.
 const RESOLVED_RTOL: f64 = 1e-12;
@@ -129,7 +132,11 @@ impl Followed {
         let halves = [[from, middle], [middle, to]].map(|ends| Half::new(&*self.motion, state_law, ends));
         let evolved = |half: &Half| half.integral(&half.dt[0], &|at| state_law.rate(at.theta * at.v));
         let growth: f64 = halves.iter().map(evolved).sum();
-        let rounding = |at: &Moment| TIME_ROUNDING * (at.t * (1.0 / at.theta).max(at.v) + 1.0);
+        let time_rtol = match self.motion.friction() {
+            Friction::Log => TIME_ROUNDING,
+            Friction::Regularised => REGULARISED_TIME_RTOL,
+        };
+        let rounding = |at: &Moment| time_rtol * (at.t * (1.0 / at.theta).max(at.v) + 1.0);
         let noise = halves.iter().flat_map(|half| &half.at).map(rounding).fold(0.0, f64::max);
         let change = after.theta - before.theta;
         let error = ((change - growth) / after.theta).abs() - noise;
@@ -152,13 +159,19 @@ impl Followed {
         (halves.iter().map(work).sum::<f64>() - work(&whole)).abs() <= RESOLVED_WORK_RTOL * size + rounding
     }
 
+    /// Friction at a moment by its definition, and its derivatives.
+    pub fn friction(&self, at: &Moment) -> Terms {
+        terms(self.motion.friction(), &self.slider.law, at.v, at.theta)
+    }
+
     /// Adds half of an interval.
     fn add(&mut self, half: &Half) {
-        let SpringBlock { law: Law { a, b }, k, m } = self.slider;
+        let SpringBlock { law: Law { a, .. }, k, m } = self.slider;
         let Half { start, places, at, times, dt: [slopes, dt], rounded } = half;
         // Below the normal numbers a velocity has no logarithm.
-        for Moment { v, theta, friction, .. } in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
-            let error = (1.0 + a * v.ln() + b * theta.ln() - friction).abs() / (1.0 + friction.abs());
+        for at in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
+            let Terms { tau, reduced, .. } = self.friction(at);
+            let error = (tau - at.friction).abs() / (reduced * (1.0 + at.friction.abs()));
             self.equation = self.equation.max(error);
         }
         if k.is_finite() {
@@ -249,26 +262,21 @@ impl Followed {
         -self.least(|moment| -f(moment))
     }
 
-    /// Least and greatest control velocity: that of the block where the spring is rigid.
-    fn control_range(&self) -> [f64; 2] {
+    /// Compares the least and the greatest velocity, and returns the least.
+    pub fn compare_velocities(&self, row: &mut CheckedRow<'_>) -> f64 {
+        let least = self.least(|at| at.v);
+        row.compare("v_min", least);
+        row.compare("v_max", self.greatest(|at| at.v));
+        least
+    }
+
+    /// Compares the least and the greatest control velocity, that of the block where the spring is rigid, and returns the greatest magnitude.
+    pub fn compare_control(&self, row: &mut CheckedRow<'_>) -> f64 {
         let control = |at: &Moment| at.v_c.unwrap_or(at.v);
-        [self.least(control), self.greatest(control)]
-    }
-
-    /// Compares the least and the greatest velocity, and returns them.
-    pub fn compare_velocities(&self, verdict: &mut Verdict, row: &Row) -> [f64; 2] {
-        let v = [self.least(|at| at.v), self.greatest(|at| at.v)];
-        verdict.compare(row, "v_min", Some(v[0]), None);
-        verdict.compare(row, "v_max", Some(v[1]), None);
-        v
-    }
-
-    /// Compares the least and the greatest control velocity, and returns the greatest magnitude.
-    pub fn compare_control(&self, verdict: &mut Verdict, row: &Row) -> f64 {
-        let range = self.control_range();
-        let size = range[0].abs().max(range[1].abs());
-        verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
-        verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
+        let (least, greatest) = (self.least(control), self.greatest(control));
+        let size = least.abs().max(greatest.abs());
+        row.compare_relative("v_c_min", least, size);
+        row.compare_relative("v_c_max", greatest, size);
         size
     }
 
