@@ -18,7 +18,7 @@ const HALF_OF_THE_DIGITS: f64 = 1e-7;
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     let (task, state) = (Task::of(row)?, row.state_law()?);
-    let Task { problem, t_f, friction, .. } = task;
+    let (Task { problem, t_f, .. }, friction) = (task, row.context.friction);
     if !(row.has_status("ok") || row.has_status(NEGATIVE)) {
         return Err("status is neither ok nor negative_friction");
     }

@@ -1,10 +1,9 @@
 //! `gap`: the work of the row's cubic, integrated over time; `W*` by the traced optimum.
 
-use super::friction::terms;
 use super::motion::{self, bisect};
 use super::route::integrate;
 use super::task::Task;
-use super::{Checked, CheckedRow, relaxed};
+use super::{Checked, CheckedRow, arcsinh, relaxed};
 use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::Status;
 
@@ -13,7 +12,7 @@ const SCAN_POINTS: u32 = 2000;
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     let (task, state) = (Task::of(row)?, row.state_law()?);
-    let Task { problem, t_f, friction, .. } = task;
+    let (Task { problem, t_f, .. }, friction) = (task, row.context.friction);
     let coefficients = row.coefficients(t_f).ok_or("an axis is missing")?;
     let cubic = Cubic::new(&problem, t_f, coefficients).under(state, friction);
     let slack = cubic.slack();
@@ -29,7 +28,9 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
         return Ok(());
     }
     row.compare("v_min", cubic.v_min());
-    row.compare_friction(cubic.friction_min());
+    if friction == Friction::Log {
+        row.compare_friction(cubic.friction_min());
+    }
     let work = cubic.work();
     match work {
         Some(work) => row.compare("work", work),
@@ -37,6 +38,7 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     }
     let least = match relaxed {
         Some(optimum) => optimum.value,
+        None if friction == Friction::Regularised => arcsinh::least_work(row, &problem, t_f),
         None => row.certify(&task).map(|optimum| optimum.work),
     };
     if let Some(least) = least {
@@ -115,7 +117,10 @@ impl Cubic {
     }
 
     fn friction(&self, at: Place) -> f64 {
-        terms(self.form, &self.law, self.velocity(at), self.theta(at)).tau
+        match self.form {
+            Friction::Log => 1.0 + self.law.a * self.velocity(at).ln() + self.law.b * self.theta(at).ln(),
+            Friction::Regularised => arcsinh::tau(&self.law, self.velocity(at), self.theta(at)),
+        }
     }
 
     pub fn friction_min(&self) -> f64 {

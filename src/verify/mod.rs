@@ -1,11 +1,11 @@
 //! Audit of a dataset: a sample of its rows is checked by the equations that their protocols obey, or solved by a second route.
 
+mod arcsinh;
 mod best_cubic;
 mod checked_row;
 mod compliant;
 mod crossover;
 mod feedback;
-mod friction;
 mod gap;
 mod hopf;
 mod motion;

@@ -1,8 +1,7 @@
 //! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
 use super::CheckedRow;
-use super::friction::{Terms, terms};
-use crate::model::{Friction, Law, StateLaw};
+use crate::model::{Law, StateLaw};
 use crate::numerics::radau::{NODES, Nodes, radau};
 use crate::protocol::{Moment, Motion, SpringBlock};
 
@@ -37,9 +36,6 @@ const SLOPE_ROUNDING: f64 = 2e4 * f64::EPSILON;
 
 /// Rounding of a time in the slopes of a polynomial through sixteen of them. Chosen: four roundings for each value.
 const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
-
-/// Relative error of the times of regularised friction, whose extremal is found by its duration. Chosen: a hundredth of the default `rtol`.
-const REGULARISED_TIME_RTOL: f64 = 1e-12;
 
 /// Relative error of theta above which an interval may be split. Chosen: a hundredth of the default `rtol`.
 const RESOLVED_RTOL: f64 = 1e-12;
@@ -132,11 +128,7 @@ impl Followed {
         let halves = [[from, middle], [middle, to]].map(|ends| Half::new(&*self.motion, state_law, ends));
         let evolved = |half: &Half| half.integral(&half.dt[0], &|at| state_law.rate(at.theta * at.v));
         let growth: f64 = halves.iter().map(evolved).sum();
-        let time_rtol = match self.motion.friction() {
-            Friction::Log => TIME_ROUNDING,
-            Friction::Regularised => REGULARISED_TIME_RTOL,
-        };
-        let rounding = |at: &Moment| time_rtol * (at.t * (1.0 / at.theta).max(at.v) + 1.0);
+        let rounding = |at: &Moment| TIME_ROUNDING * (at.t * (1.0 / at.theta).max(at.v) + 1.0);
         let noise = halves.iter().flat_map(|half| &half.at).map(rounding).fold(0.0, f64::max);
         let change = after.theta - before.theta;
         let error = ((change - growth) / after.theta).abs() - noise;
@@ -159,19 +151,13 @@ impl Followed {
         (halves.iter().map(work).sum::<f64>() - work(&whole)).abs() <= RESOLVED_WORK_RTOL * size + rounding
     }
 
-    /// Friction at a moment by its definition, and its derivatives.
-    pub fn friction(&self, at: &Moment) -> Terms {
-        terms(self.motion.friction(), &self.slider.law, at.v, at.theta)
-    }
-
     /// Adds half of an interval.
     fn add(&mut self, half: &Half) {
-        let SpringBlock { law: Law { a, .. }, k, m } = self.slider;
+        let SpringBlock { law: Law { a, b }, k, m } = self.slider;
         let Half { start, places, at, times, dt: [slopes, dt], rounded } = half;
         // Below the normal numbers a velocity has no logarithm.
-        for at in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
-            let Terms { tau, reduced, .. } = self.friction(at);
-            let error = (tau - at.friction).abs() / (reduced * (1.0 + at.friction.abs()));
+        for Moment { v, theta, friction, .. } in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
+            let error = (1.0 + a * v.ln() + b * theta.ln() - friction).abs() / (1.0 + friction.abs());
             self.equation = self.equation.max(error);
         }
         if k.is_finite() {

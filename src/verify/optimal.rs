@@ -1,13 +1,13 @@
 //! `optimal`: the traced optimum obeys the equations and conserves `C`, and no bound holds it back from less work: it is the extremal.
 //!
 //! With the costate `beta` of `theta` the Hamiltonian `tau v - beta theta'` is `-C` all the way. Off the bounds it is stationary in `v`,
-//! so `C = a v - (tau + a)/theta`, with `a tanh(tau/a)` for `a` if friction is regularised; on the floor it rises with `v`, on a ceiling it falls.
-//! What it falls by is the multiplier of the bound, whose integral is a derivative of the work.
+//! so `C = a v - (tau + a)/theta`; on the floor it rises with `v`, on a ceiling it falls. What it falls by is the multiplier of the bound, whose
+//! integral is a derivative of the work.
 
 use super::motion::Followed;
 use super::task::Task;
-use super::{Checked, CheckedRow, relaxed};
-use crate::model::{Law, StateLaw, Transition};
+use super::{Checked, CheckedRow, arcsinh, relaxed};
+use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::optimal::{ArcKind, Bounds};
 use crate::protocol::{Moment, SpringBlock, Status};
 
@@ -59,14 +59,12 @@ impl Task {
     }
 
     /// `C` at a moment, and the size of its terms.
-    fn conserved(&self, motion: &Followed, at: &Moment) -> (f64, f64) {
-        let (a, reduced) = (self.problem.law.a, motion.friction(at).reduced);
-        let &Moment { v, theta, friction, beta, .. } = at;
+    fn conserved(&self, at: &Moment) -> (f64, f64) {
+        let (a, &Moment { v, theta, friction, beta, .. }) = (self.problem.law.a, at);
         match beta {
-            // Where friction is close to -a, its terms cancel. Regularised friction of a block at rest has no derivative by `ln v`.
-            _ if self.arc(at) == ArcKind::Free && reduced > 0.0 => {
-                let c = reduced * a * v - (friction + reduced * a) / theta;
-                (c, reduced * (a * v + (1.0 + a + friction.abs()) / theta))
+            // Where friction is close to -a, its terms cancel.
+            _ if self.arc(at) == ArcKind::Free => {
+                (a * v - (friction + a) / theta, a * v + (1.0 + a + friction.abs()) / theta)
             }
             Some(beta) => {
                 let push = friction * v;
@@ -106,7 +104,7 @@ impl Task {
         if growth * slips[1] > MAX_GROWTH && !sits {
             return Err("paths that slide long on the friction ceiling");
         }
-        let conserved: Vec<_> = motion.samples.iter().map(|(_, at)| self.conserved(&motion, at)).collect();
+        let conserved: Vec<_> = motion.samples.iter().map(|(_, at)| self.conserved(at)).collect();
         let (c, size) = conserved.iter().copied().min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((f64::NAN, f64::NAN));
         let drift = conserved.iter().map(|(other, size)| (other - c).abs() / size).fold(0.0, f64::max);
         // Where friction is too low for a proof, a bound may hold the optimum back.
@@ -175,16 +173,14 @@ impl Optimum {
         };
         let by_tau = |before: &Moment, at: &Moment| multiplier(before, at, ArcKind::TauCeiling) * at.v / a;
         let by_law = |before: &Moment, at: &Moment| at.v + by_tau(before, at);
-        // Below the normal numbers a velocity has no logarithm.
-        let friction = |at: &Moment| self.motion.friction(&Moment { v: at.v.max(f64::MIN_POSITIVE), ..*at });
         let summed = |column, f: &dyn Fn(&Moment, &Moment) -> f64| {
             (column, self.motion.integral_along(f), self.motion.rounding(|at| f(at, at)))
         };
         let [start, end] = [self.start, self.end].map(|at| at.beta.unwrap_or(f64::NAN));
         let (from, to) = (self.task.from(), 1.0 / self.task.problem.v_f);
         [
-            summed("dwork_da", &|before, at| by_law(before, at) * friction(at).by_a),
-            summed("dwork_db", &|before, at| by_law(before, at) * friction(at).by_b),
+            summed("dwork_da", &|before, at| by_law(before, at) * at.v.max(f64::MIN_POSITIVE).ln()),
+            summed("dwork_db", &|before, at| by_law(before, at) * at.theta.ln()),
             ("dwork_dv_i", start * from * from, 0.0),
             ("dwork_dv_f", -end * to * to, 0.0),
             summed("dwork_dv_ceiling", &|before, at| -multiplier(before, at, ArcKind::VCeiling)),
@@ -257,6 +253,9 @@ impl Optimum {
 }
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    if row.context.friction == Friction::Regularised {
+        return arcsinh::check(row);
+    }
     if row.state_law()? != StateLaw::Ageing {
         return relaxed::check(row);
     }

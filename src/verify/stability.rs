@@ -1,8 +1,7 @@
 //! `stability`: the roots of the characteristic polynomial with 32 digits: a real one by bisection, the others from what is left.
 
-use super::friction::linearised;
 use super::motion::bisect;
-use super::{Checked, CheckedRow, hopf};
+use super::{Checked, CheckedRow, arcsinh, hopf};
 use crate::model::{Friction, Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 
@@ -55,7 +54,10 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     let (problem, state, k, m) = (row.transition()?, row.state_law()?, row.axis("k")?, row.axis("m")?);
     let double = DoubleDouble::new;
     let friction = row.context.friction;
-    let law = |v: f64| linearised(friction, &problem.law, v);
+    let law = |v: f64| match friction {
+        Friction::Log => problem.law,
+        Friction::Regularised => arcsinh::linearised(&problem.law, v),
+    };
     let critical = |v: f64| {
         let (a, b) = (double(law(v).a), double(law(v).b));
         (b - a) * (double(1.0) + double(m) * double(v) * double(v) / a)

@@ -2,9 +2,9 @@
 
 use super::CheckedRow;
 use super::route::integrate;
-use crate::model::{Friction, Transition, friction_margin};
+use crate::model::{Transition, friction_margin};
 use crate::protocol::optimal::Bounds;
-use crate::protocol::{Motion, Status, arcsinh, optimal};
+use crate::protocol::{Motion, Status, optimal};
 
 /// A transition to steady sliding in a given time, under bounds.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +14,6 @@ pub struct Task {
     pub theta: Option<f64>,
     pub t_f: f64,
     pub bounds: Bounds,
-    pub friction: Friction,
 }
 
 /// Least and greatest feasible time, or the ceiling that allows none, if it is one alone.
@@ -34,24 +33,19 @@ const MOTION_RTOL: f64 = 1e-12;
 const SMALL_TIME: f64 = 1e-3;
 
 impl Task {
-    /// The transition between steady sliding, with the logarithm.
+    /// The transition between steady sliding.
     pub fn new(problem: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Task {
-        Task { problem: *problem, theta: None, t_f, bounds: bounds.into(), friction: Friction::Log }
+        Task { problem: *problem, theta: None, t_f, bounds: bounds.into() }
     }
 
     /// That of a row.
     pub fn of(row: &CheckedRow<'_>) -> Result<Task, &'static str> {
-        let task = Task::new(&row.transition()?, row.axis("t_f")?, row.bounds());
-        Ok(Task { friction: row.context.friction, ..task })
+        Ok(Task::new(&row.transition()?, row.axis("t_f")?, row.bounds()))
     }
 
     /// The status of the optimum, and its motion.
     pub fn solve(&self) -> (Status, Option<Box<dyn Motion>>) {
-        let Task { ref problem, theta, t_f, bounds, friction } = *self;
-        if friction == Friction::Regularised {
-            let (solved, motion) = arcsinh::motion(problem, t_f);
-            return (solved.status, motion);
-        }
+        let Task { ref problem, theta, t_f, bounds } = *self;
         let (solved, motion) = match theta {
             Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, MOTION_RTOL),
             None => optimal::motion(problem, t_f, bounds, MOTION_RTOL),
