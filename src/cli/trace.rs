@@ -25,7 +25,7 @@ use crate::trace::{
     self, Absence, COLUMNS, Disturbance, Disturbed, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace,
     TracedPath, VALUE_RTOL,
 };
-use crate::verify::scale;
+use crate::verify::{relative, scale};
 
 /// Arguments of `trace`.
 #[derive(Debug, clap::Args)]
@@ -584,20 +584,16 @@ impl Arguments {
         let units = units(&spec.model)?;
         let friction = friction(&spec.model)?;
         let headings = frame::headings(&part).map_err(Failure::failed)?.0;
-        let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
-            let heading = headings.iter().find(|heading| heading.name == alpha.name());
-            heading.is_some_and(|heading| heading.unit == units.name(alpha.unit(Scale::Duration)))
-        });
+        let relative = relative(&headings, &units);
         let definition = table::find(name);
-        let mut scaled = [(number, written.clone())];
+        let mut scaled = written.clone();
         if let Some(definition) = definition {
             scale(&mut scaled, definition, &units, relative);
         }
         let bounded = spec.model.velocity_bound;
         let t_f = self.t_f.map(|t_f| units.scaled(Quantity::Time.unit(Scale::Model), t_f));
-        let (protocol_name, protocol, case) =
-            trace::protocol_of(name, &scaled[0].1, (friction, bounded, relative), t_f)
-                .map_err(|reason| wrong(format!("{}: row {number} of `{name}`: {reason}", path.display())))?;
+        let (protocol_name, protocol, case) = trace::protocol_of(name, &scaled, (friction, bounded, relative), t_f)
+            .map_err(|reason| wrong(format!("{}: row {number} of `{name}`: {reason}", path.display())))?;
         let key = if name == "gap_min" { "gap" } else { name };
         let own = spec.tables.get(key).and_then(|table| table.rtol);
         let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);

@@ -1,7 +1,6 @@
 //! A protocol whose state variable is disturbed on the way: the rest of it open loop, with the velocity as planned, and closed loop, with
 //! the optimal velocity of the disturbed state.
 
-use super::sample;
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, radau};
@@ -33,12 +32,8 @@ pub(super) struct MotionStart {
     t: f64,
 }
 
-/// The place and the moment of a motion at the time of `disturbance`. `None` if the motion cannot be resolved.
-pub(super) fn place(motion: &dyn Motion, disturbance: &Disturbance) -> Option<(f64, Moment)> {
-    sample::at_time(motion, disturbance.at * motion.duration())
-}
-
 impl MotionStart {
+    /// The part of `motion` up to a place, and its moment there.
     pub(super) fn new(motion: Box<dyn Motion>, (s, moment): (f64, Moment)) -> MotionStart {
         MotionStart { motion, s, t: moment.t }
     }

@@ -1,6 +1,7 @@
 //! The protocols that can be traced, by name, and their parameters.
 
 use super::disturbed::{self, Disturbance, Rest};
+use super::sample;
 use crate::grid::Quantity;
 use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
@@ -413,7 +414,8 @@ impl Disturbed {
         let rtol = rtol.min(DISTURBED_RTOL);
         let motion = || Ok::<_, Absence>(optimum(case, bounds, rtol)?.motion);
         let planned = optimum(case, bounds, rtol)?;
-        let place = disturbed::place(&*planned.motion, disturbance).ok_or(Obstacle::NotConverged)?;
+        let t = disturbance.at * planned.motion.duration();
+        let place = sample::at_time(&*planned.motion, t).ok_or(Obstacle::NotConverged)?;
         let moment = place.1;
         let left = case.t_f - moment.t;
         let go = |theta: f64| rest(&Case { t_f: left, ..*case }, theta, bounds, rtol);

@@ -43,8 +43,9 @@ pub fn protocol_of(
     if !TABLES.contains(&table) {
         return Err(Pathless::Table(table.to_owned()));
     }
-    let word = |name: &str| match row.iter().find(|(known, _)| known == name) {
-        Some((_, Cell::Word(word))) => Some(word.as_str()),
+    let cell = |name: &str| row.iter().find(|(known, _)| known == name).map(|(_, cell)| cell);
+    let word = |name: &str| match cell(name) {
+        Some(Cell::Word(word)) => Some(word.as_str()),
         _ => None,
     };
     match word(STATUS) {
@@ -59,10 +60,7 @@ pub fn protocol_of(
     if table == "step_response" && t_f.is_none() {
         return Err(Pathless::Duration);
     }
-    let written = |quantity: Quantity| match row.iter().find(|(known, _)| known == quantity.name()) {
-        Some((_, Cell::Number(number))) => Some(*number),
-        _ => None,
-    };
+    let written = |quantity: Quantity| cell(quantity.name()).and_then(Cell::number);
     let number = |quantity: Quantity| {
         let time = written(Quantity::Time);
         let value = match quantity {

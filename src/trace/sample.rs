@@ -140,14 +140,15 @@ impl Samples {
 
     /// The least and the greatest velocity of the motion.
     pub fn velocities(&self, motion: &dyn Motion) -> (f64, f64) {
-        (-self.greatest(|s| -motion.at(s).v, |moment| -moment.v), self.greatest(|s| motion.at(s).v, |moment| moment.v))
+        (-self.greatest(motion, |moment| -moment.v), self.greatest(motion, |moment| moment.v))
     }
 
     /// The greatest value, by golden section between the neighbours of the greatest sample.
-    fn greatest(&self, value: impl Fn(f64) -> f64, of: impl Fn(&Moment) -> f64) -> f64 {
+    fn greatest(&self, motion: &dyn Motion, of: impl Fn(&Moment) -> f64) -> f64 {
         let order = |i: &usize, j: &usize| of(&self.samples[*i].moment).total_cmp(&of(&self.samples[*j].moment));
         let top = (0..self.samples.len()).max_by(order).unwrap_or(0);
         let mut best = of(&self.samples[top].moment);
+        let value = |s: f64| of(&motion.at(s));
         let (mut low, mut high) =
             (self.samples[top.saturating_sub(1)].s, self.samples[(top + 1).min(self.samples.len() - 1)].s);
         let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
@@ -176,31 +177,32 @@ const SECTIONS: u32 = 40;
 
 /// The moments at `count >= 2` equally spaced times from 0 to `t_f`. `None` as for [`Samples::of`].
 pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {
-    let t_f = motion.duration();
-    let marks: Vec<CurvePoint> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
-    let (first, last) = (marks.first()?, marks.last()?);
+    let (t_f, marks) = (motion.duration(), marks(motion)?);
     let mut rows = Vec::with_capacity(count);
-    rows.push(Moment { t: 0.0, ..first.moment });
+    rows.push(Moment { t: 0.0, ..marks.first()?.moment });
     for i in 1..count.saturating_sub(1) {
         let t = t_f * (i as f64 / (count - 1) as f64);
-        let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len() - 1);
-        let found = meet(motion, t, &marks[after - 1], &marks[after])?;
-        rows.push(Moment { t, ..found.moment });
+        rows.push(Moment { t, ..meet(motion, t, &marks)?.moment });
     }
-    rows.push(Moment { t: t_f, ..last.moment });
+    rows.push(Moment { t: t_f, ..marks.last()?.moment });
     Some(rows)
 }
 
 /// The place and the moment of `motion` at time `t`. `None` as for [`Samples::of`].
 pub fn at_time(motion: &dyn Motion, t: f64) -> Option<(f64, Moment)> {
-    let marks: Vec<CurvePoint> = motion.landmarks().into_iter().map(|s| look(motion, s)).collect::<Option<_>>()?;
-    let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len().max(2) - 1);
-    let found = meet(motion, t, marks.get(after - 1)?, marks.get(after)?)?;
-    Some((found.s, found.moment))
+    let CurvePoint { s, moment } = meet(motion, t, &marks(motion)?)?;
+    Some((s, moment))
 }
 
-/// The moment at time `t` between two samples. `None` as for [`Samples::of`].
-fn meet(motion: &dyn Motion, t: f64, low: &CurvePoint, high: &CurvePoint) -> Option<CurvePoint> {
+/// The moments at the landmarks.
+fn marks(motion: &dyn Motion) -> Option<Vec<CurvePoint>> {
+    motion.landmarks().into_iter().map(|s| look(motion, s)).collect()
+}
+
+/// The moment at time `t` between two of the `marks`. `None` as for [`Samples::of`].
+fn meet(motion: &dyn Motion, t: f64, marks: &[CurvePoint]) -> Option<CurvePoint> {
+    let after = marks.partition_point(|mark| mark.moment.t <= t).clamp(1, marks.len().max(2) - 1);
+    let (low, high) = (marks.get(after - 1)?, marks.get(after)?);
     let off = |sample: &CurvePoint| sample.moment.t - t;
     let ends = [off(low), off(high)];
     let mut nearest = if -ends[0] < ends[1] { *low } else { *high };

@@ -2,12 +2,10 @@
 //! bisection, take its time and its work.
 
 use super::motion::bisect;
-use super::verdict::{Checked, Verdict, number, word};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow};
 use crate::model::{Law, Transition};
 use crate::numerics::radau::radau;
 use crate::protocol::arcsinh::solve;
-use crate::table::STATUS;
 
 /// Panels of each branch. Chosen: shorter than the scale of the least `a`; the nodes near the turning point keep half the digits.
 const PANELS: u32 = 60;
@@ -106,8 +104,8 @@ fn turn_rounding(problem: &Transition, theta_max: f64) -> f64 {
 
 /// The work of the optimum of `problem` and `t_f` by the Hamiltonian `h` and the greatest theta of a solution, whose error of time is recorded;
 /// `None` where the sides of both ends contradict each other.
-pub fn certify(
-    verdict: &mut Verdict,
+fn certify(
+    row: &mut CheckedRow<'_>,
     problem: &Transition,
     t_f: f64,
     [h, theta_max, v_start, v_end]: [f64; 4],
@@ -115,7 +113,7 @@ pub fn certify(
     let extremal = Extremal { law: problem.law, h };
     let sides = [v_start < problem.v_i, v_end < problem.v_f];
     if sides == [false, true] {
-        verdict.push("optimum", f64::INFINITY);
+        row.push("optimum", f64::INFINITY);
         return None;
     }
     let [time, lag, work] = extremal.path(problem, theta_max, sides);
@@ -124,45 +122,38 @@ pub fn certify(
     let error = if rise > 0.0 { lag / (t_f - rise) - 1.0 } else { time / t_f - 1.0 };
     for (v, theta, rises) in [(v_start, 1.0 / problem.v_i, sides[0]), (v_end, 1.0 / problem.v_f, sides[1])] {
         let expected = (extremal.ln_u(theta.ln(), rises) - theta.ln()).exp();
-        verdict.push("velocity", if expected < 1e-300 { v } else { (v / expected - 1.0).abs() });
+        row.push("velocity", if expected < 1e-300 { v } else { (v / expected - 1.0).abs() });
     }
     let error = (error.abs() - turn_rounding(problem, theta_max)).max(0.0);
-    verdict.push("time", error * (h * if rise > 0.0 { t_f - rise } else { t_f } / work).abs().min(1.0));
+    row.push("time", error * (h * if rise > 0.0 { t_f - rise } else { t_f } / work).abs().min(1.0));
     Some(work)
 }
 
 /// Checks a row of `optimal`.
-pub fn check(row: &Row, problem: &Transition, t_f: f64, rtol: f64) -> Checked {
-    let mut verdict = Verdict::default();
-    let infeasible = t_f <= (problem.v_i - problem.v_f) / problem.v_i / problem.v_f;
-    verdict.status(row, infeasible);
-    if infeasible || word(row, STATUS) == Some("infeasible") {
-        return Ok(verdict);
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, t_f) = (row.transition()?, row.axis("t_f")?);
+    if !row.compare_feasible(t_f > (problem.v_i - problem.v_f) / problem.v_i / problem.v_f) {
+        return Ok(());
     }
-    let numbers = ["hamiltonian", "theta_max", "v_start", "v_end"].map(|column| number(row, column));
+    let numbers = ["hamiltonian", "theta_max", "v_start", "v_end"].map(|column| row.number(column));
     let [Some(h), Some(theta_max), Some(v_start), Some(v_end)] = numbers else {
         return Err("a column is not written: hamiltonian, theta_max, v_start or v_end");
     };
-    let work = certify(&mut verdict, problem, t_f, [h, theta_max, v_start, v_end]);
-    let noise = turn_rounding(problem, theta_max) / rtol;
-    verdict.compare(row, "work", work, work.map(|work| work.abs() * (1.0 + noise)));
+    let work = certify(row, &problem, t_f, [h, theta_max, v_start, v_end]);
+    let noise = turn_rounding(&problem, theta_max) / row.context.rtol;
+    row.compare_relative("work", work, work.unwrap_or(1.0).abs() * (1.0 + noise));
     let greatest =
         if v_start < problem.v_i && v_end > problem.v_f { theta_max } else { 1.0 / problem.v_i.min(problem.v_f) };
-    verdict.compare(row, "theta_max", Some(greatest), None);
-    verdict.compare_word(row, "strategy", if v_start > problem.v_i { "speed_up" } else { "slow_down" });
-    Ok(verdict)
+    row.compare("theta_max", greatest);
+    row.compare_word("strategy", if v_start > problem.v_i { "speed_up" } else { "slow_down" });
+    Ok(())
 }
 
-/// Compares the gap of a protocol of work `work` to the optimum.
-pub fn compare(verdict: &mut Verdict, row: &Row, problem: &Transition, t_f: f64, work: Option<f64>) {
+/// The least work, confirmed as in [`check`].
+pub fn least_work(row: &mut CheckedRow<'_>, problem: &Transition, t_f: f64) -> Option<f64> {
     let Some(found) = solve(problem, t_f).value.map(|found| found.optimum) else {
-        return verdict.compare(row, "work_optimal", None, None);
+        row.compare("work_optimal", None);
+        return None;
     };
-    let numbers = [found.hamiltonian, found.theta_max, found.v_start, found.v_end];
-    let Some(optimal) = certify(verdict, problem, t_f, numbers) else { return };
-    verdict.compare(row, "work_optimal", Some(optimal), None);
-    if let Some(work) = work {
-        let gap = (work - optimal) / optimal;
-        verdict.compare(row, "gap", Some(gap), Some(gap.abs().max(1.0)));
-    }
+    certify(row, problem, t_f, [found.hamiltonian, found.theta_max, found.v_start, found.v_end])
 }

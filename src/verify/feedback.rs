@@ -2,30 +2,20 @@
 
 use super::optimal::Optimum;
 use super::task::Task;
-use super::verdict::{Checked, axis};
-use super::{Context, Verdict, number, word};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow};
 use crate::model::{Law, Transition};
-use crate::protocol::optimal::{ArcKind, Bounds};
-use crate::table::STATUS;
+use crate::protocol::optimal::ArcKind;
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
-    let (theta, t_f, v_f) = (axis(row, "theta")?, axis(row, "t_left")?, axis(row, "v_f")?);
-    let law = Law { a: axis(row, "a")?, b: axis(row, "b")? };
-    let [v_ceiling, tau_ceiling] = ["v_ceiling", "tau_ceiling"].map(|name| number(row, name).unwrap_or(f64::INFINITY));
-    let problem = Transition { law, v_i: 1.0 / theta, v_f };
-    let bounds = Bounds { floor: context.bounded, v_ceiling, tau_ceiling };
-    let task = Task { problem, theta: Some(theta), t_f, bounds };
-    let mut verdict = Verdict::default();
-    task.compare_status(&mut verdict, row);
-    if number(row, "v").is_none() && number(row, "costate").is_none() {
-        if word(row, STATUS) != Some("infeasible") {
-            verdict.miss("a column is missing: v or costate");
-        }
-        return Ok(verdict);
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (theta, t_f, v_f) = (row.axis("theta")?, row.axis("t_left")?, row.axis("v_f")?);
+    let problem = Transition { law: row.law()?, v_i: 1.0 / theta, v_f };
+    let task = Task { theta: Some(theta), ..Task::new(&problem, t_f, row.bounds()) };
+    row.compare_feasible(task.is_feasible());
+    if row.number("v").or(row.number("costate")).is_none() {
+        return if row.has_status("infeasible") { Ok(()) } else { Err("a column is missing: v or costate") };
     }
-    let Some(optimum) = task.certify(&mut verdict) else { return Ok(verdict) };
-    let near = task.near();
+    let Some(optimum) = row.certify(&task) else { return Ok(()) };
+    let (near, rtol) = (task.near(), row.context.rtol);
     let near = near.as_ref().unwrap_or(&optimum);
     let costate = |optimum: &Optimum| -optimum.start.beta.unwrap_or(f64::NAN);
     for (column, expected, other) in [
@@ -33,16 +23,14 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
         ("work_to_go", optimum.work, near.work),
         ("costate", costate(&optimum), costate(near)),
     ] {
-        verdict.compare(row, column, Some(expected), Some(expected.abs() + (other - expected).abs() / rtol));
+        row.compare_relative(column, expected, expected.abs() + (other - expected).abs() / rtol);
     }
-    verdict.compare_word(row, "arc", optimum.arc().name());
-    if number(row, "gain").is_some() {
-        match gain(&task, &optimum, near) {
-            Some((gain, noise)) => verdict.compare(row, "gain", Some(gain), Some(gain.abs() + noise / rtol)),
-            None => verdict.miss("gains at the border of what is feasible"),
-        }
+    row.compare_word("arc", optimum.arc().name());
+    if row.number("gain").is_some() {
+        let (gain, noise) = gain(&task, &optimum, near).ok_or("gains at the border of what is feasible")?;
+        row.compare_relative("gain", gain, gain.abs() + noise / rtol);
     }
-    Ok(verdict)
+    Ok(())
 }
 
 /// Relative step of theta. Chosen: the fifth root of the noise of a velocity, 1e-12, balances both errors of the extrapolated difference
@@ -62,7 +50,7 @@ fn gain(task: &Task, optimum: &Optimum, near: &Optimum) -> Option<(f64, f64)> {
     }
     let v = |step: f64| {
         let neighbour = Task { theta: Some(theta * (1.0 + step)), ..*task };
-        Some(neighbour.certify(&mut Verdict::default())?.start.v)
+        Some(neighbour.certify().ok()?.start.v)
     };
     let slope = |step: f64| Some((v(step)? - v(-step)?) / (2.0 * step * theta));
     let (wide, narrow) = (slope(2.0 * THETA_STEP_RTOL)?, slope(THETA_STEP_RTOL)?);

@@ -1,64 +1,50 @@
-//! `gap`: the work of the row's cubic, integrated over time; `W*` by integration of the extremal.
+//! `gap`: the work of the row's cubic, integrated over time; `W*` by the traced optimum.
 
 use super::motion::{self, bisect};
-use super::optimal::compare_gap;
 use super::route::integrate;
 use super::task::Task;
-use super::verdict::{Checked, axis, state_law};
-use super::{Context, Verdict, arcsinh, number, relaxed, transition, word};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow, arcsinh, relaxed};
 use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::Status;
-use crate::table::STATUS;
 
 /// Number of points at which a function is evaluated before its least value is refined. Chosen: many for each extremum of a quotient of cubics.
 const SCAN_POINTS: u32 = 2000;
 
-pub fn check(row: &Row, context: &Context) -> Checked {
-    let (problem, t_f, state) = (transition(row)?, axis(row, "t_f")?, state_law(row)?);
-    let (alpha_2, alpha_3) = (axis(row, "alpha_2")?, axis(row, "alpha_3")?);
-    let a_2 = if context.relative[0] { alpha_2 } else { alpha_2 * t_f };
-    let a_3 = if context.relative[1] { alpha_3 } else { alpha_3 * t_f * t_f };
-    let form = context.friction;
-    let cubic = Cubic { form, ..Cubic::new(&problem, t_f, a_2, a_3).under(state) };
-    let mut verdict = Verdict::default();
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (task, state) = (Task::of(row)?, row.state_law()?);
+    let (Task { problem, t_f, .. }, friction) = (task, row.context.friction);
+    let coefficients = row.coefficients(t_f).ok_or("an axis is missing")?;
+    let cubic = Cubic::new(&problem, t_f, coefficients).under(state, friction);
     let slack = cubic.slack();
     if slack.abs() < 1e-9 {
         return Err("within 1e-9 of the border of feasibility");
     }
-    let v_ceiling = number(row, "v_ceiling").unwrap_or(f64::INFINITY);
-    let task = Task::new(&problem, t_f, context.bounded);
-    let has_ceiling = state == StateLaw::Ageing && v_ceiling.is_finite();
-    let optimum =
-        (state != StateLaw::Ageing).then(|| relaxed::certify(&mut verdict, &problem, state, (t_f, v_ceiling)));
-    let is_late = match &optimum {
-        Some(optimum) => optimum.status == Status::Infeasible,
-        None => task.is_feasible() == Some(false),
+    let relaxed = (state != StateLaw::Ageing).then(|| relaxed::certify(row, &problem, state, t_f));
+    let has_optimum = match &relaxed {
+        Some(optimum) => Some(optimum.status != Status::Infeasible),
+        None => task.is_feasible(),
     };
-    let is_short = has_ceiling && word(row, STATUS) == Some("infeasible");
-    let infeasible = slack <= 0.0 || is_late || is_short;
-    verdict.status(row, infeasible);
-    if infeasible || word(row, STATUS) == Some("infeasible") {
-        return Ok(verdict);
+    if !row.compare_feasible(if slack <= 0.0 { Some(false) } else { has_optimum }) {
+        return Ok(());
+    }
+    row.compare("v_min", cubic.v_min());
+    if friction == Friction::Log {
+        row.compare_friction(cubic.friction_min());
     }
     let work = cubic.work();
-    verdict.compare(row, "v_min", Some(cubic.v_min()), None);
-    if context.friction == Friction::Log {
-        verdict.friction(row, cubic.friction_min());
-    }
     match work {
-        Some(work) => verdict.compare(row, "work", Some(work), None),
-        None => verdict.miss("the independent integrator failed"),
+        Some(work) => row.compare("work", work),
+        None => row.miss("the independent integrator failed"),
     }
-    match optimum {
-        _ if form == Friction::Regularised => arcsinh::compare(&mut verdict, row, &problem, t_f, work),
-        _ if has_ceiling => {
-            verdict.miss("the optimum of ageing under a velocity ceiling: the table optimal has its check")
-        }
-        Some(optimum) => compare_gap(&mut verdict, row, optimum.value, work),
-        None => task.compare_gap(&mut verdict, row, work),
+    let least = match relaxed {
+        Some(optimum) => optimum.value,
+        None if friction == Friction::Regularised => arcsinh::least_work(row, &problem, t_f),
+        None => row.certify(&task).map(|optimum| optimum.work),
+    };
+    if let Some(least) = least {
+        row.compare_gap(least, work);
     }
-    Ok(verdict)
+    Ok(())
 }
 
 /// A cubic shortcut over `x = t/t_f`.
@@ -80,7 +66,8 @@ pub fn place(x: f64) -> Place {
 }
 
 impl Cubic {
-    pub fn new(problem: &Transition, t_f: f64, a_2: f64, a_3: f64) -> Cubic {
+    /// With ageing and the logarithm.
+    pub fn new(problem: &Transition, t_f: f64, [a_2, a_3]: [f64; 2]) -> Cubic {
         let (theta_0, theta_1) = (1.0 / problem.v_i, 1.0 / problem.v_f);
         let (state, form) = (StateLaw::Ageing, Friction::Log);
         let change = theta_1 - theta_0;
@@ -89,9 +76,9 @@ impl Cubic {
         Cubic { state, form, law: problem.law, t_f, theta: [from_start, from_end] }
     }
 
-    /// This cubic under an evolution law of the state.
-    pub fn under(self, state: StateLaw) -> Cubic {
-        Cubic { state, ..self }
+    /// This cubic under an evolution law of the state and a form of friction.
+    pub fn under(self, state: StateLaw, form: Friction) -> Cubic {
+        Cubic { state, form, ..self }
     }
 
     fn theta(&self, (from_end, x): Place) -> f64 {

@@ -5,8 +5,7 @@
 
 use nalgebra::{Complex, Matrix3, Vector3};
 
-use super::verdict::Verdict;
-use crate::dataset::Row;
+use super::CheckedRow;
 use crate::model::{Law, StateLaw};
 
 type Number = Complex<f64>;
@@ -22,18 +21,10 @@ fn solve(matrix: Matrix3<Number>, right: Vector) -> Vector {
 /// Size of the coefficient, in units of `a/mass`, below which rounding decides its sign. Chosen: a thousand roundings.
 const SIGN_ROUNDING: f64 = 1e-13;
 
-/// Second and third derivative of `G` at 1 (docs/derivations.md).
-fn derivatives(state: StateLaw) -> [f64; 2] {
-    match state {
-        StateLaw::Ageing => [0.0, 0.0],
-        StateLaw::Slip => [-1.0, 1.0],
-        StateLaw::Prz => [-1.0, 0.0],
-    }
-}
-
 /// A Hopf point: derivatives of the evolution law, material, and scaled mass `m v^2`.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
+    /// Second and third derivative of `G` at 1 (docs/derivations.md).
     evolution: [f64; 2],
     /// Whether the coefficient is 0 without mass.
     is_degenerate: bool,
@@ -44,10 +35,14 @@ pub struct Point {
 impl Point {
     /// That of a law of the state.
     pub fn new(state: StateLaw, law: Law, mass: f64) -> Point {
-        Point { evolution: derivatives(state), is_degenerate: state != StateLaw::Prz, law, mass }
+        match state {
+            StateLaw::Ageing => Point::interpolated(1.0, law, mass),
+            StateLaw::Slip => Point::interpolated(0.0, law, mass),
+            StateLaw::Prz => Point { evolution: [-1.0, 0.0], is_degenerate: false, law, mass },
+        }
     }
 
-    /// That of the interpolated law.
+    /// That of the law between slip, 0, and ageing, 1.
     pub fn interpolated(eps: f64, law: Law, mass: f64) -> Point {
         Point { evolution: [eps - 1.0, (1.0 - eps) * (1.0 + eps)], is_degenerate: true, law, mass }
     }
@@ -63,25 +58,19 @@ fn evolution([second, third]: [f64; 2], vectors: [[Number; 2]; 3]) -> [Number; 2
     [p * q * second + u * q + v * p, p * q * r * third - once * second - twice]
 }
 
-/// The flow at its Hopf point: frequency, Jacobian, eigenvectors, and the forms of its second and third derivatives.
-struct Forms<'a> {
+/// The coefficient of a flow at its Hopf point: its frequency, Jacobian, eigenvectors `q` and `p`, and the forms of its second and third derivatives.
+fn lyapunov(
     omega: f64,
     jacobian: Matrix3<f64>,
-    q: Vector,
-    p: Vector,
-    second: &'a dyn Fn(&Vector, &Vector) -> Vector,
-    third: &'a dyn Fn(&Vector, &Vector, &Vector) -> Vector,
-}
-
-impl Forms<'_> {
-    fn coefficient(&self) -> f64 {
-        let Forms { omega, jacobian, q, p, second, third } = self;
-        let (mirrored, jacobian) = (q.conjugate(), jacobian.map(|x| Number::new(x, 0.0)));
-        let still = solve(jacobian, second(q, &mirrored));
-        let double = solve(Matrix3::from_diagonal_element(Number::new(0.0, 2.0 * omega)) - jacobian, second(q, q));
-        let sum = third(q, q, &mirrored) - second(q, &still) * Number::new(2.0, 0.0) + second(&mirrored, &double);
-        (p.dotc(&sum) / p.dotc(q)).re / (2.0 * omega)
-    }
+    [q, p]: [Vector; 2],
+    second: impl Fn(&Vector, &Vector) -> Vector,
+    third: impl Fn(&Vector, &Vector, &Vector) -> Vector,
+) -> f64 {
+    let (mirrored, jacobian) = (q.conjugate(), jacobian.map(|x| Number::new(x, 0.0)));
+    let still = solve(jacobian, second(&q, &mirrored));
+    let double = solve(Matrix3::from_diagonal_element(Number::new(0.0, 2.0 * omega)) - jacobian, second(&q, &q));
+    let sum = third(&q, &q, &mirrored) - second(&q, &still) * Number::new(2.0, 0.0) + second(&mirrored, &double);
+    (p.dotc(&sum) / p.dotc(&q)).re / (2.0 * omega)
 }
 
 impl Point {
@@ -117,7 +106,7 @@ impl Point {
             (jacobian, one, Vector::new(i / (omega * mass), one * (b / mass) / (i * omega - one), one))
         };
         let q = Vector::new(i * (k / omega), -one / (one + i * omega), last);
-        Some(Forms { omega, jacobian, q, p, second: &second, third: &third }.coefficient())
+        Some(lyapunov(omega, jacobian, [q, p], second, third))
     }
 
     /// The unit in which rounding is counted: the forms have `1/mass` in them.
@@ -126,18 +115,18 @@ impl Point {
     }
 
     /// Compares the first Lyapunov coefficient.
-    pub fn compare_coefficient(&self, verdict: &mut Verdict, row: &Row, rtol: f64) {
+    pub fn compare_coefficient(&self, row: &mut CheckedRow<'_>) {
         let expected = self.coefficient();
-        let noise = 1e-14 * self.rounding() / rtol;
-        verdict.compare(row, "first_lyapunov_coefficient", expected, expected.map(|l| l.abs() + noise));
+        let noise = 1e-14 * self.rounding() / row.context.rtol;
+        row.compare_relative("first_lyapunov_coefficient", expected, expected.map_or(0.0, f64::abs) + noise);
     }
 
     /// Compares the type of the Hopf point.
-    pub fn compare_kind(&self, verdict: &mut Verdict, row: &Row) {
+    pub fn compare_kind(&self, row: &mut CheckedRow<'_>) {
         match self.coefficient() {
-            Some(l) if l.abs() < SIGN_ROUNDING * self.rounding() => verdict.miss("Hopf points between the two kinds"),
-            Some(l) => verdict.compare_word(row, "hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
-            None => verdict.demand(row, "hopf_type", false),
+            Some(l) if l.abs() < SIGN_ROUNDING * self.rounding() => row.miss("Hopf points between the two kinds"),
+            Some(l) => row.compare_word("hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
+            None => row.demand("hopf_type", false),
         }
     }
 }

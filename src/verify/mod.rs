@@ -2,6 +2,7 @@
 
 mod arcsinh;
 mod best_cubic;
+mod checked_row;
 mod compliant;
 mod crossover;
 mod feedback;
@@ -20,18 +21,17 @@ mod stability;
 mod step_response;
 mod task;
 mod units;
-mod verdict;
 
 use std::path::Path;
 
-use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
-use crate::grid::{Quantity, Scale};
+use indexmap::IndexMap;
+
+use crate::dataset::{Folder, Manifest, Row, frame};
 use crate::model::{Friction, Units};
-use crate::sweep::{self, AxisSpec, Spec};
+use crate::sweep::{self, Spec};
 use crate::table;
-#[cfg(feature = "cli")]
-pub(crate) use units::scale;
-use verdict::{Context, Difference, Verdict, number, transition, word};
+use checked_row::{Checked, CheckedRow, Context, Difference};
+pub(crate) use units::{relative, scale};
 
 /// Difference above which a number is an error, in units of `rtol`. Chosen: room for the errors of the second route.
 pub const MAX_DIFFERENCE_RTOLS: f64 = 10.0;
@@ -48,11 +48,11 @@ pub struct Audit {
     /// Rows of the sample.
     pub rows: usize,
     /// Differences of each column in units of rtol, ascending.
-    pub columns: Vec<(&'static str, Vec<f64>)>,
+    pub columns: IndexMap<&'static str, Vec<f64>>,
     /// For each column the row with the greatest difference, worst first.
     pub worst: Vec<Worst>,
     /// Rows that were not checked, by reason.
-    pub unchecked: Vec<(&'static str, u64)>,
+    pub unchecked: IndexMap<&'static str, u64>,
 }
 
 /// The greatest difference in a column.
@@ -93,86 +93,63 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
         let rtol = rtol.unwrap_or(spec.accuracy.rtol);
         let (mut rows, missing) = sample::rows(&folder, manifest, table, sample, seed).map_err(VerifyError)?;
-        let relative = relative(&spec, &folder, table)?;
+        let headings = match rows.first() {
+            Some((row, _)) => frame::headings(&folder.part(&table.name, row / table.rows_per_part)).map(|all| all.0),
+            None => Ok(Vec::new()),
+        };
+        let relative = relative(&headings.map_err(|error| VerifyError(error.to_string()))?, &units);
         let friction = sweep::friction(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
         let bounded = spec.model.velocity_bound && friction == Friction::Log;
-        let context = Context { bounded, friction, relative };
+        let context = Context { bounded, friction, relative, rtol };
         // Reduced rows are compared as they were written.
         if let Some(table) = table::find(&table.name).filter(|_| !is_reduced) {
-            units::scale(&mut rows, table, &units, relative);
+            rows.iter_mut().for_each(|(_, row)| scale(row, table, &units, relative));
         }
         let mut audit = Audit {
             table: table.name.clone(),
             rtol,
             is_converted: !is_reduced && units != Units::Scaled,
             rows: rows.len(),
-            columns: Vec::new(),
+            columns: IndexMap::new(),
             worst: Vec::new(),
-            unchecked: Vec::new(),
+            unchecked: IndexMap::new(),
+        };
+        let check = |row: &mut CheckedRow<'_>| match table.name.as_str() {
+            "gap" => gap::check(row),
+            "optimal" => optimal::check(row),
+            "feedback" => feedback::check(row),
+            "crossover" => crossover::check(row),
+            "best_cubic" => best_cubic::check(row),
+            "shortcut" => shortcut::check(row),
+            "compliant" => compliant::check(row),
+            "regularised" => regularised::check(row),
+            "step_response" => step_response::check(row),
+            "stability" => stability::check(row),
+            _ if is_reduced => reduced::check(row, &units, &spec),
+            _ => Err("there is no independent route for this table"),
         };
         for (number, row) in rows {
-            let verdict = match table.name.as_str() {
-                "gap" => gap::check(&row, &context),
-                "optimal" => optimal::check(&row, &context, rtol),
-                "feedback" => feedback::check(&row, &context, rtol),
-                "crossover" => crossover::check(&row, &context),
-                "best_cubic" => best_cubic::check(&row, &context, rtol),
-                "shortcut" => shortcut::check(&row, &context, rtol),
-                "compliant" => compliant::check(&row, &context, rtol),
-                "regularised" => regularised::check(&row, &context, rtol),
-                "step_response" => step_response::check(&row, &context, rtol),
-                "stability" => stability::check(&row, &context, rtol),
-                _ if is_reduced => reduced::check(&row, &units, &spec, &context),
-                _ => Err("there is no independent route for this table"),
-            };
-            audit.add(number, row, verdict.unwrap_or_else(Verdict::unchecked));
+            let CheckedRow { differences, unchecked, .. } = CheckedRow::new(&row, context, check);
+            audit.add(number, &row, differences, unchecked);
         }
         if missing > 0 {
-            audit.unchecked.push(("their part is missing; `slipsweep run` computes it", missing));
+            audit.unchecked.insert("their part is missing; `slipsweep run` computes it", missing);
         }
-        audit.columns.iter_mut().for_each(|(_, differences)| differences.sort_by(f64::total_cmp));
+        audit.columns.values_mut().for_each(|differences| differences.sort_by(f64::total_cmp));
         audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
         audits.push(audit);
     }
     Ok(audits)
 }
 
-/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration.
-fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
-    let has_points = spec.blocks().any(|(_, block)| block.points.is_some());
-    // Only the parts contain the points of a file.
-    let headings = match folder.parts_there(table).first() {
-        Some(&part) if has_points => {
-            frame::headings(&folder.part(&table.name, part)).map_err(|error| VerifyError(error.to_string()))?.0
-        }
-        _ => Vec::new(),
-    };
-    Ok([Quantity::Alpha2, Quantity::Alpha3].map(|coefficient| {
-        let (name, unit) = (coefficient.name(), coefficient.unit(Scale::Duration));
-        match spec.axis(name) {
-            Some(AxisSpec::Form(form)) => form.unit.as_deref() == Some(unit),
-            Some(_) => false,
-            // In any system of units.
-            None if has_points => headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")),
-            None => true,
-        }
-    }))
-}
-
 impl Audit {
-    fn add(&mut self, number: u64, row: Row, verdict: Verdict) {
-        for reason in verdict.unchecked {
-            match self.unchecked.iter_mut().find(|(known, _)| *known == reason) {
-                Some((_, rows)) => *rows += 1,
-                None => self.unchecked.push((reason, 1)),
-            }
+    fn add(&mut self, number: u64, row: &Row, differences: Vec<Difference>, unchecked: Vec<&'static str>) {
+        for reason in unchecked {
+            *self.unchecked.entry(reason).or_default() += 1;
         }
-        for Difference { column, size, expected } in verdict.differences {
+        for Difference { column, size, expected } in differences {
             let difference = size / self.rtol;
-            match self.columns.iter_mut().find(|(known, _)| *known == column) {
-                Some((_, all)) => all.push(difference),
-                None => self.columns.push((column, vec![difference])),
-            }
+            self.columns.entry(column).or_default().push(difference);
             let worst = Worst { column, difference, expected, number, row: row.clone() };
             match self.worst.iter_mut().find(|known| known.column == column) {
                 Some(known) if difference > known.difference => *known = worst,
@@ -184,6 +161,6 @@ impl Audit {
 
     /// Numbers beyond [`MAX_DIFFERENCE_RTOLS`].
     pub fn errors(&self) -> usize {
-        self.columns.iter().flat_map(|(_, all)| all).filter(|difference| **difference > MAX_DIFFERENCE_RTOLS).count()
+        self.columns.values().flatten().filter(|difference| **difference > MAX_DIFFERENCE_RTOLS).count()
     }
 }

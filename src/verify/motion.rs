@@ -1,7 +1,6 @@
 //! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
-use super::Verdict;
-use crate::dataset::Row;
+use super::CheckedRow;
 use crate::model::{Law, StateLaw};
 use crate::numerics::radau::{NODES, Nodes, radau};
 use crate::protocol::{Moment, Motion, SpringBlock};
@@ -249,26 +248,21 @@ impl Followed {
         -self.least(|moment| -f(moment))
     }
 
-    /// Least and greatest control velocity: that of the block where the spring is rigid.
-    fn control_range(&self) -> [f64; 2] {
+    /// Compares the least and the greatest velocity, and returns the least.
+    pub fn compare_velocities(&self, row: &mut CheckedRow<'_>) -> f64 {
+        let least = self.least(|at| at.v);
+        row.compare("v_min", least);
+        row.compare("v_max", self.greatest(|at| at.v));
+        least
+    }
+
+    /// Compares the least and the greatest control velocity, that of the block where the spring is rigid, and returns the greatest magnitude.
+    pub fn compare_control(&self, row: &mut CheckedRow<'_>) -> f64 {
         let control = |at: &Moment| at.v_c.unwrap_or(at.v);
-        [self.least(control), self.greatest(control)]
-    }
-
-    /// Compares the least and the greatest velocity, and returns them.
-    pub fn compare_velocities(&self, verdict: &mut Verdict, row: &Row) -> [f64; 2] {
-        let v = [self.least(|at| at.v), self.greatest(|at| at.v)];
-        verdict.compare(row, "v_min", Some(v[0]), None);
-        verdict.compare(row, "v_max", Some(v[1]), None);
-        v
-    }
-
-    /// Compares the least and the greatest control velocity, and returns the greatest magnitude.
-    pub fn compare_control(&self, verdict: &mut Verdict, row: &Row) -> f64 {
-        let range = self.control_range();
-        let size = range[0].abs().max(range[1].abs());
-        verdict.compare(row, "v_c_min", Some(range[0]), Some(size));
-        verdict.compare(row, "v_c_max", Some(range[1]), Some(size));
+        let (least, greatest) = (self.least(control), self.greatest(control));
+        let size = least.abs().max(greatest.abs());
+        row.compare_relative("v_c_min", least, size);
+        row.compare_relative("v_c_max", greatest, size);
         size
     }
 

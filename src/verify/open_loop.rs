@@ -23,19 +23,41 @@ const MIN_RELAXATION_FRACTION: f64 = 1e-4;
 /// Intervals over which errors are followed, one after another. Chosen: a growing error is restarted before it hides the others.
 const ERROR_INTERVALS: usize = 256;
 
-/// A protocol as control of the spring, over the fraction `x` of the time.
-pub struct ControlledProtocol<V, C> {
+/// The smooth shortcut as control of the spring, over the fraction `x` of the time: `ln(v - 1)` is a quintic between both ends, and
+/// `alpha x^3 (1 - x)^3`.
+pub struct ControlledProtocol {
     pub slider: SpringBlock,
     pub v_i: f64,
     pub v_f: f64,
     pub t_f: f64,
-    /// Its velocity.
-    pub velocity: V,
-    /// The control as a function of the fraction of the time and `ln theta`.
-    pub control: C,
+    pub alpha: f64,
 }
 
-impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
+impl ControlledProtocol {
+    /// Velocity and its first two derivatives in time.
+    fn moment(&self, x: f64) -> [f64; 3] {
+        let &ControlledProtocol { v_i, v_f, t_f, alpha, .. } = self;
+        let start = (v_i - 1.0).ln();
+        let change = (v_f - 1.0).ln() - start;
+        let p = x * (1.0 - x);
+        let f = start + x * x * x * change * (10.0 + x * (6.0 * x - 15.0)) + alpha * p * p * p;
+        let g = p * p * (30.0 * change + 3.0 * alpha * (1.0 - 2.0 * x));
+        let h = p * (60.0 * change * (1.0 - 2.0 * x) + 6.0 * alpha * (1.0 - 5.0 * p));
+        let w = f.exp();
+        [1.0 + w, w * g / t_f, w * (h + g * g) / (t_f * t_f)]
+    }
+
+    fn velocity(&self, x: f64) -> f64 {
+        self.moment(x)[0]
+    }
+
+    /// The control velocity at `x` and `ln theta`.
+    fn control(&self, x: f64, ln_theta: f64) -> f64 {
+        let SpringBlock { law, k, m } = self.slider;
+        let [v, v1, v2] = self.moment(x);
+        v + (law.a * v1 / v + law.b * ((-ln_theta).exp() - v) + m * v2) / k
+    }
+
     /// Whether an explicit integrator cannot follow the block at its `least` velocity.
     pub fn is_stiff(&self, least: f64) -> bool {
         let SpringBlock { law, m, .. } = self.slider;
@@ -49,7 +71,7 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
         let rigid = k == f64::INFINITY;
         // Errors of v, ln theta and k s/a. A rigid spring gives v, and without mass the force does.
         let slope = |y: &[f64; 5]| {
-            let (theta, v) = (y[0].exp(), (self.velocity)(y[1]));
+            let (theta, v) = (y[0].exp(), self.velocity(y[1]));
             let driven = law.a * y[4] - law.b * y[3];
             let (dv, rate) = match () {
                 () if rigid => (0.0, 0.0),
@@ -60,9 +82,9 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
             [t_f * (1.0 / theta - v), 1.0, t_f * rate, -t_f * (y[3] / theta + dv), t_f * force]
         };
         let mut start = [ln_theta, x, 0.0, 0.0, 0.0];
-        start[2 + unit] = [(self.velocity)(x), 1.0, 1.0][unit];
+        start[2 + unit] = [self.velocity(x), 1.0, 1.0][unit];
         let end = integrate(slope, start, (0.0, length))?;
-        let error = Vector3::new(end[2] / (self.velocity)(x + length), end[3], end[4]);
+        let error = Vector3::new(end[2] / self.velocity(x + length), end[3], end[4]);
         Some((end[0], error))
     }
 
@@ -107,8 +129,8 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
         let holds = dt.map_or(1.0, |dt| (t_f / dt).ceil().max(1.0)) as u32;
         for hold in 0..holds {
             let at = |hold: u32| if hold == holds { 1.0 } else { dt.map_or(0.0, |dt| f64::from(hold) * dt / t_f) };
-            let held = dt.map(|_| (self.control)(at(hold), state[4]));
-            let control = |x: f64, aged: f64| held.unwrap_or_else(|| (self.control)(x, aged));
+            let held = dt.map(|_| self.control(at(hold), state[4]));
+            let control = |x: f64, aged: f64| held.unwrap_or_else(|| self.control(x, aged));
             let slope = |s: &[f64; 5]| {
                 let [p, y, x, place, aged] = *s;
                 let (control, rest) = (control(place, aged), p - ratio * y);
@@ -119,7 +141,7 @@ impl<V: Fn(f64) -> f64, C: Fn(f64, f64) -> f64> ControlledProtocol<V, C> {
                 };
                 let stretch = if rigid { 0.0 } else { k / law.a * (control - v) };
                 let speed = if rigid || m == 0.0 { 0.0 } else { law.a * (rest - x) / (m * v) };
-                let ageing = (-aged).exp() - (self.velocity)(place);
+                let ageing = (-aged).exp() - self.velocity(place);
                 [t_f * stretch, t_f * ((-y).exp() * v_f - v), t_f * speed, 1.0, t_f * ageing]
             };
             state[3] = at(hold);

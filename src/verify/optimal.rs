@@ -6,9 +6,7 @@
 
 use super::motion::Followed;
 use super::task::Task;
-use super::verdict::{Checked, axis, state_law};
-use super::{Context, Verdict, arcsinh, number, relaxed, transition};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow, arcsinh, relaxed};
 use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::optimal::{ArcKind, Bounds};
 use crate::protocol::{Moment, SpringBlock, Status};
@@ -22,7 +20,9 @@ pub struct Optimum {
     pub end: Moment,
     /// The conserved `C`, and its rounding error.
     pub c: f64,
-    pub c_noise: f64,
+    c_noise: f64,
+    /// Sum of the relative errors of the motion.
+    error: f64,
     /// Whether rounding leaves digits of the multipliers on the ceilings.
     has_slopes: bool,
 }
@@ -58,13 +58,43 @@ impl Task {
         }
     }
 
-    /// The optimum, if there is one, with its error as a difference of the column `optimum`.
-    pub fn certify(&self, verdict: &mut Verdict) -> Option<Optimum> {
-        let (solved, motion) = self.solve();
-        let Some(motion) = motion else {
-            verdict.miss("there is no motion of the optimum");
-            return None;
+    /// `C` at a moment, and the size of its terms.
+    fn conserved(&self, at: &Moment) -> (f64, f64) {
+        let (a, &Moment { v, theta, friction, beta, .. }) = (self.problem.law.a, at);
+        match beta {
+            // Where friction is close to -a, its terms cancel.
+            _ if self.arc(at) == ArcKind::Free => {
+                (a * v - (friction + a) / theta, a * v + (1.0 + a + friction.abs()) / theta)
+            }
+            Some(beta) => {
+                let push = friction * v;
+                (beta * (1.0 - theta * v) - push, beta.abs() * (1.0 + theta * v) + push.abs())
+            }
+            // Without a costate theta is steady.
+            None => (-friction * v, friction.abs() * v),
+        }
+    }
+
+    /// What the Hamiltonian falls by with the velocity on the floor, or rises by at a ceiling, relative to its terms.
+    fn wrong(&self, at: &Moment) -> f64 {
+        let a = self.problem.law.a;
+        let sign = match self.arc(at) {
+            ArcKind::Free => return 0.0,
+            ArcKind::Floor => -1.0,
+            ArcKind::VCeiling | ArcKind::TauCeiling => 1.0,
         };
+        let press = at.friction + a;
+        at.beta.map_or(0.0, |beta| sign * (press + beta * at.theta) / press.abs().max(a))
+    }
+
+    /// The optimum.
+    ///
+    /// # Errors
+    ///
+    /// The reason why it cannot be certified.
+    pub fn certify(&self) -> Result<Optimum, &'static str> {
+        let (status, motion) = self.solve();
+        let motion = motion.ok_or("there is no motion of the optimum")?;
         let Task { problem: Transition { law, v_f, .. }, t_f, .. } = *self;
         let rigid = SpringBlock { law, k: f64::INFINITY, m: 0.0 };
         let motion = Followed::under(StateLaw::Ageing, motion, &rigid, MAX_SPLITS);
@@ -72,63 +102,48 @@ impl Task {
         let (growth, slips) = (law.b / law.a - 1.0, [ArcKind::VCeiling, ArcKind::TauCeiling].map(slip));
         let sits = self.sits() && (motion.end().v / v_f - 1.0).abs() <= 2.0 * f64::EPSILON;
         if growth * slips[1] > MAX_GROWTH && !sits {
-            verdict.miss("paths that slide long on the friction ceiling");
-            return None;
+            return Err("paths that slide long on the friction ceiling");
         }
-        let mut conserved: Vec<(f64, f64)> = Vec::new();
-        let proven = matches!(solved.status, Status::Ok | Status::BelowBound);
-        let mut wrong = 0.0f64;
-        for (_, at) in &motion.samples {
-            let &Moment { v, theta, friction, beta, .. } = at;
-            let (press, arc) = (friction + law.a, self.arc(at));
-            if arc == ArcKind::Free {
-                // Where friction is close to -a, its terms cancel.
-                conserved.push((law.a * v - press / theta, law.a * v + (1.0 + law.a + friction.abs()) / theta));
-                continue;
-            }
-            // Without a costate theta is steady.
-            let Some(beta) = beta else {
-                conserved.push((-friction * v, friction.abs() * v));
-                continue;
-            };
-            let (pull, push) = (beta * (1.0 - theta * v), friction * v);
-            conserved.push((pull - push, beta.abs() * (1.0 + theta * v) + push.abs()));
-            // The Hamiltonian must not fall with the velocity on the floor, nor rise with it at a ceiling, except where friction is too low for
-            // a proof.
-            let sign = if arc == ArcKind::Floor { -1.0 } else { 1.0 };
-            wrong = wrong.max(if proven { sign * (press + beta * theta) / press.abs().max(law.a) } else { 0.0 });
-        }
+        let conserved: Vec<_> = motion.samples.iter().map(|(_, at)| self.conserved(at)).collect();
         let (c, size) = conserved.iter().copied().min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((f64::NAN, f64::NAN));
         let drift = conserved.iter().map(|(other, size)| (other - c).abs() / size).fold(0.0, f64::max);
+        // Where friction is too low for a proof, a bound may hold the optimum back.
+        let proven = matches!(status, Status::Ok | Status::BelowBound);
+        let wrong = motion.samples.iter().filter(|_| proven).map(|(_, at)| self.wrong(at)).fold(0.0, f64::max);
         let (start, end) = (motion.samples[0].1, motion.end());
         let arrival =
             (start.theta / self.from() - 1.0).abs() + (end.theta * v_f - 1.0).abs() + (end.t / t_f - 1.0).abs();
         let has_slopes = !sits && (slips[0] + slips[1]) * growth.abs().max(1.0) < MAX_GROWTH;
-        verdict.push("optimum", motion.equation + motion.stretch() + arrival + drift + wrong);
-        Some(Optimum { task: *self, work: motion.work, start, end, c, c_noise: 1e-14 * size, has_slopes, motion })
+        let error = motion.equation + motion.stretch() + arrival + drift + wrong;
+        Ok(Optimum { task: *self, work: motion.work, start, end, c, c_noise: 1e-14 * size, error, has_slopes, motion })
     }
 
     /// The optimum of a time that rounding does not distinguish from `t_f`.
     pub fn near(&self) -> Option<Optimum> {
-        let at = |t_f: f64| Task { t_f, ..*self }.certify(&mut Verdict::default());
+        let at = |t_f: f64| Task { t_f, ..*self }.certify().ok();
         at(self.t_f * (1.0 + TIME_NOISE)).or_else(|| at(self.t_f * (1.0 - TIME_NOISE)))
-    }
-
-    /// Compares the work of the optimum and, where the row has one, the gap of the protocol `work` above it.
-    pub fn compare_gap(&self, verdict: &mut Verdict, row: &Row, work: Option<f64>) {
-        let optimum = self.certify(verdict);
-        compare_gap(verdict, row, optimum.map(|optimum| optimum.work), work);
     }
 }
 
-/// Compares the least work, if it is known, and the gap of the protocol `work` above it.
-pub fn compare_gap(verdict: &mut Verdict, row: &Row, least: Option<f64>, work: Option<f64>) {
-    let Some(least) = least else { return };
-    verdict.compare(row, "work_optimal", Some(least), None);
-    if let Some(work) = work {
-        // The promised error of the gap is relative to the greater of 1 and the gap.
-        let gap = (work - least) / least;
-        verdict.compare(row, "gap", Some(gap), Some(gap.abs().max(1.0)));
+impl CheckedRow<'_> {
+    /// The optimum of a task, with its error as a difference of the column `optimum`; the reason where there is none is recorded.
+    pub fn certify(&mut self, task: &Task) -> Option<Optimum> {
+        let found = task.certify();
+        match &found {
+            Ok(optimum) => self.push("optimum", optimum.error),
+            Err(reason) => self.miss(reason),
+        }
+        found.ok()
+    }
+
+    /// Compares the least work and, where the row has one, the gap of the protocol `work` above it.
+    pub fn compare_gap(&mut self, least: f64, work: Option<f64>) {
+        self.compare("work_optimal", least);
+        if let Some(work) = work {
+            // The promised error of the gap is relative to the greater of 1 and the gap.
+            let gap = (work - least) / least;
+            self.compare_relative("gap", gap, gap.abs().max(1.0));
+        }
     }
 }
 
@@ -174,7 +189,8 @@ impl Optimum {
     }
 
     /// Compares the numbers of a row of this optimum.
-    fn compare(&self, verdict: &mut Verdict, row: &Row, rtol: f64) {
+    fn compare(&self, row: &mut CheckedRow<'_>) {
+        let rtol = row.context.rtol;
         let near = self.task.near();
         let near = near.as_ref().unwrap_or(self);
         let has_ceilings = self.task.bounds.has_ceilings();
@@ -185,42 +201,49 @@ impl Optimum {
             let own = if column == "hamiltonian" { self.c_noise } else { 0.0 };
             let rounding = (other - expected).abs() + if is_time { TIME_NOISE * t_f } else { 0.0 };
             let noise = own + if has_ceilings { rounding } else { 0.0 };
-            verdict.compare(row, column, Some(expected), Some(size + noise / rtol));
+            row.compare_relative(column, expected, size + noise / rtol);
         }
-        let times = [3, 4, 5].map(|place| found[place].1);
-        if !has_ceilings || times.iter().all(|&time| time == 0.0 || time > MIN_TIME_RTOL * t_f) {
-            let binding = match times.map(|time| time > 0.0) {
-                [_, true, true] => "both",
-                [_, true, false] => "v_ceiling",
-                [_, false, true] => "tau_ceiling",
-                _ => "none",
-            };
-            verdict.compare_word(row, "binding", binding);
-            let strategy = match self.start.v {
-                _ if times[0] > 0.0 => "floor",
-                v if v / self.task.problem.v_i - 1.0 > 2.0 * f64::EPSILON => "speed_up",
-                _ => "slow_down",
-            };
-            verdict.compare_word(row, "strategy", strategy);
-        }
-        verdict.compare(row, "friction_max", Some(self.motion.greatest(|at| at.friction)), None);
-        verdict.friction(row, self.motion.least(|at| at.friction));
-        if let (Some(work), Some(error)) = (number(row, "work"), number(row, "work_error")) {
+        self.compare_words(row, [3, 4, 5].map(|place| found[place].1));
+        row.compare("friction_max", self.motion.greatest(|at| at.friction));
+        row.compare_friction(self.motion.least(|at| at.friction));
+        if let (Some(work), Some(error)) = (row.number("work"), row.number("work_error")) {
             let noise = self.motion.rounding(|at| at.friction * at.v)
                 + (near.work - self.work).abs()
                 + 0.1 * rtol * self.work.abs();
-            verdict.judge("work_error", (work - self.work).abs() <= error + noise, "a bound");
+            row.judge("work_error", (work - self.work).abs() <= error + noise, "a bound");
         }
-        if !row.iter().any(|(column, _)| column.starts_with("dwork")) {
+        if !row.has_column("dwork") {
             return;
         }
         if !self.has_slopes {
-            return verdict.miss("derivatives of rows that slide long on a ceiling");
+            return row.miss("derivatives of rows that slide long on a ceiling");
         }
         for ((column, slope, noise), (_, other, _)) in self.slopes().into_iter().zip(near.slopes()) {
             let size = if slope == 0.0 { 1.0 } else { slope.abs() };
-            verdict.compare(row, column, Some(slope), Some(size + (noise + (other - slope).abs()) / rtol));
+            row.compare_relative(column, slope, size + (noise + (other - slope).abs()) / rtol);
         }
+    }
+
+    /// Compares the words for the times on the floor and on both ceilings, unless rounding decides them.
+    fn compare_words(&self, row: &mut CheckedRow<'_>, times: [f64; 3]) {
+        let is_clear = |&time: &f64| time == 0.0 || time > MIN_TIME_RTOL * self.task.t_f;
+        if self.task.bounds.has_ceilings() && !times.iter().all(is_clear) {
+            return;
+        }
+        let [at_floor, at_v_ceiling, at_tau_ceiling] = times.map(|time| time > 0.0);
+        let binding = match (at_v_ceiling, at_tau_ceiling) {
+            (true, true) => "both",
+            (true, false) => "v_ceiling",
+            (false, true) => "tau_ceiling",
+            (false, false) => "none",
+        };
+        row.compare_word("binding", binding);
+        let strategy = match self.start.v {
+            _ if at_floor => "floor",
+            v if v / self.task.problem.v_i - 1.0 > 2.0 * f64::EPSILON => "speed_up",
+            _ => "slow_down",
+        };
+        row.compare_word("strategy", strategy);
     }
 
     /// The kind of the arc at the start.
@@ -229,23 +252,18 @@ impl Optimum {
     }
 }
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
-    let (problem, t_f) = (transition(row)?, axis(row, "t_f")?);
-    if context.friction == Friction::Regularised {
-        return arcsinh::check(row, &problem, t_f, rtol);
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    if row.context.friction == Friction::Regularised {
+        return arcsinh::check(row);
     }
-    let law = state_law(row)?;
-    if law != StateLaw::Ageing {
-        return relaxed::check(row, &problem, law);
+    if row.state_law()? != StateLaw::Ageing {
+        return relaxed::check(row);
     }
-    let [v_ceiling, tau_ceiling] = ["v_ceiling", "tau_ceiling"].map(|name| number(row, name).unwrap_or(f64::INFINITY));
-    let bounds = Bounds { floor: context.bounded, v_ceiling, tau_ceiling };
-    let task = Task::new(&problem, t_f, bounds);
-    let mut verdict = Verdict::default();
-    let is_infeasible = task.compare_status(&mut verdict, row);
-    task.compare_limits(&mut verdict, row, rtol);
-    if !is_infeasible && let Some(optimum) = task.certify(&mut verdict) {
-        optimum.compare(&mut verdict, row, rtol);
+    let task = Task::of(row)?;
+    let has_numbers = row.compare_feasible(task.is_feasible());
+    task.compare_limits(row);
+    if has_numbers && let Some(optimum) = row.certify(&task) {
+        optimum.compare(row);
     }
-    Ok(verdict)
+    Ok(())
 }

@@ -5,10 +5,9 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::verdict::Checked;
-use super::{Context, Verdict, gap, number, units};
+use super::{Checked, CheckedRow, Context, gap, scale};
 use crate::dataset::{Cell, Row};
-use crate::grid::Quantity;
+use crate::grid::{Quantity, Scale};
 use crate::model::Units;
 use crate::protocol::Status;
 use crate::sweep::{AxisSpec, AxisValue, BlockSpec, Spec, Sweep, TableSpec};
@@ -24,6 +23,9 @@ const CHECKED_SHORTCUTS: u64 = 3;
 pub fn is_reduced(table: &str) -> bool {
     ["gap_min", "gap_quantiles", "gap_histogram"].contains(&table)
 }
+
+/// The axes of a landscape.
+const COEFFICIENTS: [Quantity; 2] = [Quantity::Alpha2, Quantity::Alpha3];
 
 /// The columns of quantiles, and their percentages.
 const QUANTILES: [(&str, u64); 7] = [
@@ -62,24 +64,24 @@ struct Reduced {
     classes: [u64; CLASSES.len()],
 }
 
-/// Checks a row as it was `written`, in `units`.
-pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Checked {
+/// Checks a row as it was written, in `units`.
+pub fn check(written: &mut CheckedRow<'_>, units: &Units, spec: &Spec) -> Checked {
     let sweep = landscape(written, spec).ok_or("its shortcuts are in a points file")?;
     let (stores, signal) = (sweep.optimum_cache(), Signal::default());
     let (Some(request), Some(optima)) = (sweep.requests.first(), stores.first()) else {
         return Err("its spec does not request it");
     };
     let job = sweep.job(request, optima, &signal);
-    let mut verdict = Verdict::default();
+    let relative = COEFFICIENTS.map(|alpha| sweep.grid.scale(alpha) != Some(Scale::Model));
+    let context = Context { relative, ..written.context };
     let mut buffer = ColumnBuffer::new(request.projection.indices().len());
     let mut reduced = Reduced::default();
     let cells =
         |buffer: &ColumnBuffer, place: usize| buffer.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
     let all = request.rows;
     // From the middle of equal parts of the landscape.
-    let solved =
-        (0..CHECKED_SHORTCUTS).map(|part| ((2 * part + 1) as f64 / (2 * CHECKED_SHORTCUTS) as f64 * all as f64) as u64);
-    let solved: Vec<u64> = solved.collect();
+    let middle = |part: u64| ((2 * part + 1) as f64 / (2 * CHECKED_SHORTCUTS) as f64 * all as f64) as u64;
+    let solved: Vec<u64> = (0..CHECKED_SHORTCUTS).map(middle).collect();
     for start in (0..all).step_by(SHORTCUTS_AT_ONCE) {
         let rows = start..all.min(start + SHORTCUTS_AT_ONCE as u64);
         buffer.resize((rows.end - rows.start) as usize);
@@ -90,12 +92,9 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ch
         for (row, place) in rows.zip(0..) {
             reduced.see(written, row, buffer.status[place], || cells(&buffer, place));
             if solved.contains(&row) {
-                let shortcut = shortcut(&sweep, row, &cells(&buffer, place), buffer.status[place]);
-                let mut shortcut = [(row, shortcut)];
-                units::scale(&mut shortcut, request.table, units, context.relative);
-                let found = gap::check(&shortcut[0].1, context).unwrap_or_else(Verdict::unchecked);
-                verdict.differences.extend(found.differences);
-                found.unchecked.into_iter().for_each(|reason| verdict.miss(reason));
+                let mut shortcut = shortcut(&sweep, row, &cells(&buffer, place), buffer.status[place]);
+                scale(&mut shortcut, request.table, units, relative);
+                written.extend(CheckedRow::new(&shortcut, context, gap::check));
             }
         }
     }
@@ -108,24 +107,24 @@ pub fn check(written: &Row, units: &Units, spec: &Spec, context: &Context) -> Ch
         Status::Infeasible,
     ];
     let status = order.into_iter().find(|status| reduced.status[*status as usize] > 0);
-    verdict.compare_word(written, STATUS, status.map_or("", Status::name));
+    written.compare_word(STATUS, status.map_or("", Status::name));
     if status != Some(Status::NotConverged) {
-        reduced.compare(written, &sweep, &mut verdict);
+        reduced.compare(written, &sweep);
     }
-    Ok(verdict)
+    Ok(())
 }
 
 /// The landscape of a row alone: its transition and time, and the coefficients of the sweep.
-fn landscape(written: &Row, spec: &Spec) -> Option<Sweep> {
+fn landscape(written: &CheckedRow<'_>, spec: &Spec) -> Option<Sweep> {
     let mut blocks = spec.blocks();
     let (Some((_, block)), None) = (blocks.next(), blocks.next()) else { return None };
     let mut axes = IndexMap::new();
     for axis in OPTIMUM_AXES {
-        let value = AxisValue::Number(number(written, axis.name())?);
+        let value = AxisValue::Number(written.number(axis.name())?);
         axes.insert(axis.name().to_owned(), AxisSpec::One(value));
     }
-    let coefficients = [Quantity::Alpha2, Quantity::Alpha3].map(Quantity::name);
-    axes.extend(block.axes.clone().into_iter().filter(|(name, _)| coefficients.contains(&name.as_str())));
+    let axes_of_block = block.axes.clone().into_iter();
+    axes.extend(axes_of_block.filter(|(name, _)| COEFFICIENTS.iter().any(|alpha| alpha.name() == name)));
     let rtol = spec.tables.get("gap").and_then(|table| table.rtol);
     let gap = TableSpec { rtol, ..TableSpec::default() };
     let alone = Spec {
@@ -153,7 +152,7 @@ fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
 const GAP: usize = 2;
 
 impl Reduced {
-    fn see(&mut self, written: &Row, row: u64, status: Status, cells: impl FnOnce() -> Vec<f64>) {
+    fn see(&mut self, written: &CheckedRow<'_>, row: u64, status: Status, cells: impl FnOnce() -> Vec<f64>) {
         self.status[status as usize] += 1;
         if status != Status::Ok {
             return;
@@ -161,7 +160,7 @@ impl Reduced {
         let cells = cells();
         let gap = cells[GAP];
         for ((column, _), [below, same]) in QUANTILES.iter().zip(&mut self.quantiles) {
-            if let Some(quantile) = number(written, column) {
+            if let Some(quantile) = written.number(column) {
                 *below += u64::from(gap < quantile);
                 *same += u64::from(gap == quantile);
             }
@@ -174,30 +173,29 @@ impl Reduced {
     }
 
     /// Compares the written columns of the reduction.
-    fn compare(&self, written: &Row, sweep: &Sweep, verdict: &mut Verdict) {
+    fn compare(&self, written: &mut CheckedRow<'_>, sweep: &Sweep) {
         let ok = self.status[Status::Ok as usize];
-        verdict.compare(written, "shortcuts", Some(ok as f64), Some(1.0));
+        written.compare_relative("shortcuts", ok as f64, 1.0);
         for ((column, hundredths), [below, same]) in QUANTILES.iter().zip(self.quantiles) {
-            if ok > 0 && number(written, column).is_some() {
+            if ok > 0 && written.number(column).is_some() {
                 // A quantile is the least gap that so many shortcuts do not exceed.
                 let enough = 100 * (below + same) >= hundredths * ok;
                 let least = below == 0 || 100 * below < hundredths * ok;
-                verdict.push(column, if same > 0 && enough && least { 0.0 } else { f64::INFINITY });
+                written.push(column, if same > 0 && enough && least { 0.0 } else { f64::INFINITY });
             } else {
-                verdict.demand(written, column, ok > 0);
+                written.demand(column, ok > 0);
             }
         }
         for ((column, _), count) in CLASSES.iter().zip(self.classes) {
-            verdict.compare(written, column, Some(count as f64), Some(1.0));
+            written.compare_relative(column, count as f64, 1.0);
         }
         let request = &sweep.requests[0];
         let point = self.least.as_ref().map(|(row, _)| request.row_index.point(*row));
-        for axis in [Quantity::Alpha2, Quantity::Alpha3] {
-            verdict.compare(written, axis.name(), point.as_ref().map(|point| point[axis]), Some(1.0));
+        for axis in COEFFICIENTS {
+            written.compare_relative(axis.name(), point.as_ref().map(|point| point[axis]), 1.0);
         }
         for (place, name) in ["work", "work_optimal", "gap", "v_min"].into_iter().enumerate() {
-            let cell = self.least.as_ref().map(|(_, cells)| cells[place]);
-            verdict.compare(written, name, cell, None);
+            written.compare(name, self.least.as_ref().map(|(_, cells)| cells[place]));
         }
     }
 }

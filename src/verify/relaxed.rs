@@ -3,7 +3,7 @@
 
 use super::motion::{bisect, lowest};
 use super::route::integrate;
-use super::verdict::{Checked, Verdict, axis, number, word};
+use super::{Checked, CheckedRow};
 use crate::dataset::{Cell, Row};
 use crate::model::{Law, StateLaw, Transition};
 use crate::protocol::Solved;
@@ -38,14 +38,6 @@ struct Arc {
     end: f64,
     work: f64,
     by_b: f64,
-}
-
-/// A piece of a path at one velocity, between two `ln theta`.
-#[derive(Clone, Copy)]
-struct Slide {
-    v: f64,
-    from: f64,
-    to: f64,
 }
 
 /// The numbers of a row that determine its arcs.
@@ -93,25 +85,15 @@ impl Block {
         duty * fast.1 + (1.0 - duty) * slow.1
     }
 
-    /// Compares the derivatives of the work at the ends of a path, and that with respect to `b`, which is `by_b`.
-    fn slopes(&self, verdict: &mut Verdict, row: &Row, arcs: &Arcs, by_b: f64) {
-        let on_ceiling = arcs.fast * self.ceiling * self.ceiling.ln();
-        verdict.compare(row, "dwork_da", Some(on_ceiling), None);
-        // With the work of a steady slide at v = 1.
-        verdict.compare(row, "dwork_db", Some(by_b), Some(by_b.abs() + arcs.t_f));
-        self.costates(verdict, row, arcs);
-    }
-
     /// Compares the derivatives of the work with respect to both ends by the costate `(H - tau v)/theta'`.
-    fn costates(&self, verdict: &mut Verdict, row: &Row, arcs: &Arcs) {
-        let speeds = ["v_start", "v_end"].map(|column| number(row, column));
-        let signs = [("dwork_dv_i", -1.0), ("dwork_dv_f", 1.0)];
-        for (((column, sign), w), v) in signs.into_iter().zip(arcs.ends).zip(speeds) {
-            let Some(v) = v else { continue };
+    fn compare_costates(&self, row: &mut CheckedRow<'_>, arcs: &Arcs) {
+        let [start, end] = arcs.ends;
+        for (column, sign, w, v) in [("dwork_dv_i", -1.0, start, "v_start"), ("dwork_dv_f", 1.0, end, "v_end")] {
+            let Some(v) = row.number(v) else { continue };
             let (theta, power) = (w.exp(), self.friction(w, v) * v);
             let rate = self.state.rate(theta * v) / (theta * theta);
             let size = (arcs.hamiltonian.abs() + power.abs()) / rate.abs();
-            verdict.compare_number(row, column, sign * (arcs.hamiltonian - power) / rate, size);
+            row.compare_number(column, sign * (arcs.hamiltonian - power) / rate, size);
         }
     }
 
@@ -131,56 +113,38 @@ impl Block {
         };
         integrate(slope, [from, 0.0, 0.0], (from, to)).map(|[_, time, work]| [time, work])
     }
-
-    /// Compares the greatest state and friction of a path, and its velocities at the ends where it slides there.
-    fn extremes(&self, verdict: &mut Verdict, row: &Row, slides: &[Slide]) {
-        let slides_on = |slide: &&Slide| (slide.to - slide.from).abs() > NO_SLIDE * (1.0 + slide.from.abs());
-        for (column, slide) in [("v_start", slides.first()), ("v_end", slides.last())] {
-            if let Some(slide) = slide.filter(slides_on) {
-                verdict.compare(row, column, Some(slide.v), None);
-            }
-        }
-        let highest = slides.iter().map(|slide| slide.from.max(slide.to)).fold(f64::NEG_INFINITY, f64::max);
-        verdict.compare(row, "theta_max", Some(highest.exp()), None);
-        let friction = slides.iter().map(|slide| self.friction(slide.from.max(slide.to), slide.v));
-        verdict.compare(row, "friction_max", Some(friction.fold(f64::NEG_INFINITY, f64::max)), None);
-    }
 }
 
 /// Checks a row of a law other than ageing.
-pub fn check(row: &Row, problem: &Transition, state: StateLaw) -> Checked {
-    let (t_f, ceiling) = (axis(row, "t_f")?, axis(row, "v_ceiling")?);
-    let block = Block { state, law: problem.law, ceiling };
-    if number(row, "work").is_none() {
-        return Ok(infeasible(row, &block, problem, t_f));
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, t_f) = (row.transition()?, row.axis("t_f")?);
+    let block = Block { state: row.state_law()?, law: problem.law, ceiling: row.axis("v_ceiling")? };
+    if row.number("work").is_none() {
+        return infeasible(row, &block, &problem, t_f);
     }
-    let needed = ["time_at_floor", "time_at_v_ceiling", "hamiltonian"].map(|column| number(row, column));
-    let ([Some(floor), Some(fast), Some(hamiltonian)], Some(strategy)) = (needed, word(row, "strategy")) else {
+    let needed = ["time_at_floor", "time_at_v_ceiling", "hamiltonian"].map(|column| row.number(column));
+    let ([Some(floor), Some(fast), Some(hamiltonian)], Some(strategy)) = (needed, row.word("strategy")) else {
         return Err("columns of the arcs are not written");
     };
     let arcs = Arcs { t_f, floor, fast, hamiltonian, ends: [-problem.v_i.ln(), -problem.v_f.ln()] };
-    let mut verdict = Verdict::default();
     let done = match strategy {
-        "rise" => rise(&mut verdict, row, &block, &arcs),
-        _ => bang_bang(&mut verdict, row, &block, &arcs, strategy),
+        "rise" => rise(row, &block, &arcs),
+        _ => bang_bang(row, &block, &arcs, strategy),
     };
-    if done.is_none() {
-        verdict.miss("an arc is too long, or columns of the chattering are not written");
-    }
-    Ok(verdict)
+    done.ok_or("an arc is too long, or columns of the chattering are not written")
 }
 
-/// The optimum of a law other than ageing, its work confirmed by [`check`].
-pub fn certify(
-    verdict: &mut Verdict,
-    problem: &Transition,
-    state: StateLaw,
-    (t_f, v_ceiling): (f64, f64),
-) -> Solved<f64> {
+/// The least work of a law other than ageing, confirmed by [`check`] as a difference of the column `optimum`.
+pub fn certify(row: &mut CheckedRow<'_>, problem: &Transition, state: StateLaw, t_f: f64) -> Solved<f64> {
+    let v_ceiling = row.bounds().v_ceiling;
     let solved = relaxed::solve(state, problem, t_f, v_ceiling);
     let optimum = solved.value.map(|found| found.optimum);
     let chatter = solved.value.and_then(|found| found.chatter);
     let numbers = [
+        ("a", Some(problem.law.a)),
+        ("b", Some(problem.law.b)),
+        ("v_i", Some(problem.v_i)),
+        ("v_f", Some(problem.v_f)),
         ("t_f", Some(t_f)),
         ("v_ceiling", Some(v_ceiling)),
         ("work", optimum.map(|found| found.work)),
@@ -191,21 +155,24 @@ pub fn certify(
         ("chatter_theta", chatter.map(|found| found.theta)),
         ("chatter_duty", chatter.map(|found| found.duty)),
     ];
-    let words = [("strategy", optimum.map_or("", |found| found.strategy.name())), (STATUS, solved.status.name())];
+    let strategy = optimum.map_or("", |found| found.strategy.name());
+    let words = [("law", state.name()), ("strategy", strategy), (STATUS, solved.status.name())];
     let numbers = numbers.into_iter().filter_map(|(name, number)| Some((name.to_owned(), Cell::Number(number?))));
     let words = words.into_iter().map(|(name, word)| (name.to_owned(), Cell::Word(word.to_owned())));
-    let row: Row = numbers.chain(words).collect();
-    verdict.confirm("optimum", check(&row, problem, state).unwrap_or_else(Verdict::unchecked));
+    let cells: Row = numbers.chain(words).collect();
+    let found = CheckedRow::new(&cells, row.context, check);
+    row.push("optimum", found.differences.iter().map(|difference| difference.size).fold(0.0, f64::max));
+    found.unchecked.into_iter().for_each(|reason| row.miss(reason));
     solved.map(|found| found.optimum.work)
 }
 
 /// Compares a path of one arc on each bound, between which theta may rest while they alternate; `None` if the integrator fails or a column of the
 /// chattering is missing.
-fn bang_bang(verdict: &mut Verdict, row: &Row, block: &Block, arcs: &Arcs, strategy: &str) -> Option<()> {
+fn bang_bang(row: &mut CheckedRow<'_>, block: &Block, arcs: &Arcs, strategy: &str) -> Option<()> {
     let Arcs { t_f, floor, fast, ends: [start, end], .. } = *arcs;
     let chatters = strategy == "chatter";
     let [time, theta, duty] = ["chatter_time", "chatter_theta", "chatter_duty"]
-        .map(|column| if chatters { number(row, column) } else { Some(0.0) });
+        .map(|column| if chatters { row.number(column) } else { Some(0.0) });
     let (time, rest, duty) = (time?, theta?.ln(), duty?);
     let [wait, jerk] = [(1.0, floor - time * (1.0 - duty)), (block.ceiling, fast - time * duty)];
     let toward = |from: f64, to: f64| if to > from { wait } else { jerk };
@@ -220,74 +187,84 @@ fn bang_bang(verdict: &mut Verdict, row: &Row, block: &Block, arcs: &Arcs, strat
     let is_one = v == v_next;
     let second = block.follow(turn, v_next, if is_one { 0.0 } else { t_next })?;
     let off = if is_one { first.end - end } else { (first.end - turn).abs() + (second.end - end).abs() };
-    verdict.push("time", ((floor + fast) / t_f - 1.0).abs());
-    verdict.push("theta_end", off.abs() / (1.0 + start.abs().max(end.abs())));
+    row.push("time", ((floor + fast) / t_f - 1.0).abs());
+    row.push("theta_end", off.abs() / (1.0 + start.abs().max(end.abs())));
     let price = block.price(turn);
-    let resting = if chatters { time * price } else { 0.0 };
-    verdict.compare(row, "work", Some(first.work + resting + second.work), None);
-    verdict.compare(row, "hamiltonian", Some(price), None);
-    let of_rest = if chatters { time * rest * (duty * block.ceiling + 1.0 - duty) } else { 0.0 };
-    block.slopes(verdict, row, arcs, first.by_b + of_rest + second.by_b);
+    let (resting, resting_by_b) =
+        if chatters { (time * price, time * rest * (duty * block.ceiling + 1.0 - duty)) } else { (0.0, 0.0) };
+    row.compare("work", first.work + resting + second.work);
+    row.compare("hamiltonian", price);
+    row.compare("dwork_da", fast * block.ceiling * block.ceiling.ln());
+    // With the work of a steady slide at v = 1.
+    let by_b = first.by_b + resting_by_b + second.by_b;
+    row.compare_relative("dwork_db", by_b, by_b.abs() + t_f);
+    block.compare_costates(row, arcs);
     if chatters {
         let around = [turn - PRICE_STEP, turn + PRICE_STEP].map(|w| block.price(w));
-        verdict.push("price", if around.iter().all(|other| *other > price) { 0.0 } else { f64::INFINITY });
-    } else if word(row, STATUS) != Some("unproven") {
+        row.push("price", if around.iter().all(|other| *other > price) { 0.0 } else { f64::INFINITY });
+    } else if !row.has_status("unproven") {
         let least = |from: f64, to: f64| lowest(&|w| block.price(w), (from, to), PRICE_POINTS);
         let least = least(start, turn).min(least(turn, end));
-        verdict.push("price", ((price - least) / price.abs()).max(0.0));
+        row.push("price", ((price - least) / price.abs()).max(0.0));
     }
-    let [before, after] = [(v, start, turn), (v_next, turn, end)].map(|(v, from, to)| Slide { v, from, to });
-    let [slow, quick] = [1.0, block.ceiling].map(|v| Slide { v, from: turn, to: turn });
-    if chatters {
-        block.extremes(verdict, row, &[before, slow, quick, after]);
-    } else if fast > 0.0 && floor > 0.0 {
-        block.extremes(verdict, row, &[before, after]);
+    if chatters || fast > 0.0 && floor > 0.0 {
+        let around: &[f64] = if chatters { &[1.0, block.ceiling] } else { &[] };
+        compare_extremes(row, block, [(v, start, turn), (v_next, turn, end)], around);
     }
     Some(())
 }
 
+/// Compares velocities at the ends, greatest state and friction of two arcs, with their velocities and `ln theta` at their ends, and these
+/// velocities `around` the turn.
+fn compare_extremes(row: &mut CheckedRow<'_>, block: &Block, arcs: [(f64, f64, f64); 2], around: &[f64]) {
+    for (column, (v, from, to)) in ["v_start", "v_end"].into_iter().zip(arcs) {
+        if (to - from).abs() > NO_SLIDE * (1.0 + from.abs()) {
+            row.compare(column, v);
+        }
+    }
+    let highest = arcs.iter().map(|(_, from, to)| from.max(*to));
+    row.compare("theta_max", highest.fold(f64::NEG_INFINITY, f64::max).exp());
+    let at_turn = around.iter().map(|v| block.friction(arcs[0].2, *v));
+    let friction = arcs.iter().map(|(v, from, to)| block.friction(from.max(*to), *v)).chain(at_turn);
+    row.compare("friction_max", friction.fold(f64::NEG_INFINITY, f64::max));
+}
+
 /// Compares a path faster than at `v = 1`, which ends as long before the end as the time at `v = 1`; `None` if that is too long.
-fn rise(verdict: &mut Verdict, row: &Row, block: &Block, arcs: &Arcs) -> Option<()> {
+fn rise(row: &mut CheckedRow<'_>, block: &Block, arcs: &Arcs) -> Option<()> {
     let Arcs { t_f, floor, hamiltonian, ends: [start, end], .. } = *arcs;
     let last = if floor > 0.0 { end * floor.exp() } else { end };
     let [time, work] = block.rise(start, last, -hamiltonian)?;
     let wait = block.follow(last, 1.0, floor)?;
-    verdict.push("time", ((time + floor) / t_f - 1.0).abs());
-    verdict.compare(row, "work", Some(work + wait.work), None);
-    verdict.compare(row, "theta_max", Some(end.exp()), None);
-    verdict.compare(row, "v_start", Some((block.rise_ln_u(start, -hamiltonian) - start).exp()), None);
-    let v_end = if floor > 0.0 { 1.0 } else { (block.rise_ln_u(end, -hamiltonian) - end).exp() };
-    verdict.compare(row, "v_end", Some(v_end), None);
-    block.costates(verdict, row, arcs);
+    let velocity = |w: f64| (block.rise_ln_u(w, -hamiltonian) - w).exp();
+    row.push("time", ((time + floor) / t_f - 1.0).abs());
+    row.compare("work", work + wait.work);
+    row.compare("theta_max", end.exp());
+    row.compare("v_start", velocity(start));
+    row.compare("v_end", if floor > 0.0 { 1.0 } else { velocity(end) });
+    block.compare_costates(row, arcs);
     Some(())
 }
 
 /// Checks a row without numbers: the direct way, at `v = 1` or on the ceiling, takes longer than `t_f`.
-fn infeasible(row: &Row, block: &Block, problem: &Transition, t_f: f64) -> Verdict {
-    let mut verdict = Verdict::default();
-    if word(row, STATUS) != Some("infeasible") || number(row, "work").is_some() {
-        verdict.miss("optima without a proof");
-        return verdict;
+fn infeasible(row: &mut CheckedRow<'_>, block: &Block, problem: &Transition, t_f: f64) -> Checked {
+    if !row.has_status("infeasible") {
+        return Err("optima without a proof");
     }
     let (start, end) = (-problem.v_i.ln(), -problem.v_f.ln());
     if problem.v_f >= block.ceiling {
-        return verdict;
+        return Ok(());
     }
-    if end > start && block.state == StateLaw::Slip && start < -1.0 {
+    let is_short = if end > start && block.state == StateLaw::Slip && start < -1.0 {
         // The fastest rise, v = 1/(e theta) up to theta = 1/e.
         let (turn, capped) = (end.min(-1.0), -1.0 - block.ceiling.ln());
         let on_ceiling = if start < capped { (capped - start + 1.0).ln() / block.ceiling } else { 0.0 };
         let least = std::f64::consts::E * (turn.exp() - start.max(capped).exp()) + (turn / end).ln() + on_ceiling;
-        verdict.push("t_least", if t_f < least * (1.0 + 1e-9) { 0.0 } else { f64::INFINITY });
-        return verdict;
-    }
-    let v = if end > start { 1.0 } else { block.ceiling };
-    match block.follow(start, v, t_f) {
-        Some(arc) => {
-            let is_short = if end > start { arc.end < end + 1e-9 } else { arc.end > end - 1e-9 };
-            verdict.push("t_least", if is_short { 0.0 } else { f64::INFINITY });
-        }
-        None => verdict.miss("an arc is too long"),
-    }
-    verdict
+        t_f < least * (1.0 + 1e-9)
+    } else {
+        let v = if end > start { 1.0 } else { block.ceiling };
+        let reached = block.follow(start, v, t_f).ok_or("an arc is too long")?.end;
+        if end > start { reached < end + 1e-9 } else { reached > end - 1e-9 }
+    };
+    row.push("t_least", if is_short { 0.0 } else { f64::INFINITY });
+    Ok(())
 }

@@ -1,103 +1,127 @@
 //! `shortcut`: the traced member obeys the equations and the formula of its family, and arrives.
 
+use super::checked_row::NEGATIVE;
 use super::gap::{Cubic, place};
 use super::motion::Followed;
 use super::route::integrate;
 use super::task::{Task, min_duration};
-use super::verdict::{Checked, NEGATIVE, axis};
-use super::{Context, Verdict, number, transition, word};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow};
 use crate::model::Transition;
-use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{Case, find};
 use crate::protocol::{Moment, SpringBlock};
-use crate::table::STATUS;
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
-    let (problem, t_f) = (transition(row)?, axis(row, "t_f")?);
-    let name = word(row, "family").ok_or("an axis is missing")?;
-    let case = Case { transition: problem, t_f, tau_ceiling: number(row, "tau_ceiling").unwrap_or(f64::INFINITY) };
-    if !matches!(word(row, STATUS), Some("ok" | "below_bound" | NEGATIVE | "infeasible")) {
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, t_f, bounds) = (row.transition()?, row.axis("t_f")?, row.bounds());
+    let name = row.word("family").ok_or("an axis is missing")?;
+    let case = Case { transition: problem, t_f, tau_ceiling: bounds.tau_ceiling };
+    if !["ok", "below_bound", NEGATIVE, "infeasible"].iter().any(|status| row.has_status(status)) {
         return Err("status is neither ok, below_bound, negative_friction nor infeasible");
     }
-    let bound = obstacle(&case, name, context.bounded)
+    let bound = obstacle(&case, name, bounds.floor)
         .ok_or("too close to the border to determine whether the family has a member")?;
-    let mut verdict = Verdict::default();
-    verdict.status(row, bound.is_some());
+    let has_numbers = row.compare_feasible(bound.is_none());
     if let Some(bound) = bound {
-        verdict.compare_word(row, "bound", bound);
+        row.compare_word("bound", bound);
     }
-    if bound.is_some() || word(row, STATUS) == Some("infeasible") {
-        return Ok(verdict);
+    if !has_numbers {
+        return Ok(());
     }
-    let Some(Ok(motion)) = find(name).map(|family| family.motion(&case, rtol)) else {
-        verdict.push("motion", f64::INFINITY);
-        return Ok(verdict);
+    let Some(Ok(motion)) = find(name).map(|family| family.motion(&case, row.context.rtol)) else {
+        row.push("motion", f64::INFINITY);
+        return Ok(());
     };
     let followed = Followed::new(motion, &SpringBlock { law: problem.law, k: f64::INFINITY, m: 0.0 });
     let miss = followed.end().theta * problem.v_f - 1.0;
-    let formula = formula(&mut verdict, row, &case, name, &followed, rtol);
+    let formula = formula(row, &case, name, &followed);
     let arrival = if name == "step" { 0.0 } else { miss.abs() };
-    verdict.push("motion", followed.equation + arrival + formula + (followed.end().t / t_f - 1.0).abs());
-    verdict.compare(row, "terminal_error", Some(if name == "step" { miss } else { 0.0 }), Some(1.0));
-    verdict.compare(row, "work", Some(followed.work), None);
-    followed.compare_velocities(&mut verdict, row);
+    row.push("motion", followed.equation + arrival + formula + (followed.end().t / t_f - 1.0).abs());
+    row.compare_relative("terminal_error", if name == "step" { miss } else { 0.0 }, 1.0);
+    row.compare("work", followed.work);
+    followed.compare_velocities(row);
     let friction_max = followed.greatest(|at| at.friction);
-    verdict.compare(row, "friction_max", Some(friction_max), Some(friction_max.abs().max(1.0)));
-    verdict.friction(row, followed.least(|at| at.friction));
+    row.compare_relative("friction_max", friction_max, friction_max.abs().max(1.0));
+    row.compare_friction(followed.least(|at| at.friction));
     // The optimum of this family has its ceiling.
-    let ceiling = if name == "bounded_friction" { case.tau_ceiling } else { f64::INFINITY };
-    let bounds = Bounds::new(context.bounded).with_tau_ceiling(ceiling);
-    Task::new(&problem, t_f, bounds).compare_gap(&mut verdict, row, Some(followed.work));
-    Ok(verdict)
+    let bounds = if name == "bounded_friction" { bounds } else { bounds.without_ceilings() };
+    if let Some(optimum) = row.certify(&Task::new(&problem, t_f, bounds)) {
+        row.compare_gap(optimum.work, Some(followed.work));
+    }
+    Ok(())
 }
 
-/// Distance of a moment from the bound of its family, and the size of its terms.
-type Distance<'a> = &'a dyn Fn(&Moment) -> (f64, f64);
+/// A family by the distance of its motions from a bound: the logarithm of that over the one at the start is `l p(x) + c q(x)`, `x = t/t_f`.
+pub struct Exponential<'a> {
+    pub t_f: f64,
+    /// Distance at the start.
+    pub first: f64,
+    pub l: f64,
+    /// `p` and `q`.
+    pub shape: fn(f64) -> [f64; 2],
+    /// Distance of a moment from the bound, and the size of its terms.
+    pub distance: &'a dyn Fn(&Moment) -> [f64; 2],
+    /// Relative rounding of the distances at the ends, in units of `8 eps`.
+    pub rounding: f64,
+}
 
-/// Compares `alpha` with that of the moment that determines it best; the greatest distance from the formula along the motion.
-fn formula(verdict: &mut Verdict, row: &Row, case: &Case, name: &str, followed: &Followed, rtol: f64) -> f64 {
+impl Exponential<'_> {
+    /// `c` by the moment that determines it best, with its rounding error, and the greatest distance from the formula along the motion.
+    pub fn fit(&self, followed: &Followed) -> Option<[f64; 3]> {
+        let moment = |(_, at): &(f64, Moment)| ((self.shape)(at.t / self.t_f), (self.distance)(at));
+        let moments: Vec<([f64; 2], [f64; 2])> = followed.samples.iter().map(moment).collect();
+        let coefficient = |&([p, q], [distance, size]): &([f64; 2], [f64; 2])| {
+            let noise = 8.0 * f64::EPSILON * (size / distance.abs() + self.l.abs() + self.rounding);
+            [((distance / self.first).ln() - self.l * p) / q, noise / q]
+        };
+        let determined = moments.iter().map(coefficient).filter(|fit| fit.iter().all(|number| number.is_finite()));
+        let [c, noise] = determined.min_by(|x, y| x[1].total_cmp(&y[1]))?;
+        let off = |&([p, q], [distance, size]): &([f64; 2], [f64; 2])| {
+            let expected = self.first * (self.l * p + c * q).exp();
+            ((distance - expected).abs() / size - noise * q * expected / size).max(0.0)
+        };
+        Some([c, noise, moments.iter().map(off).fold(0.0, f64::max)])
+    }
+}
+
+/// Compares `alpha`; the greatest distance from the formula of the family along the motion.
+fn formula(row: &mut CheckedRow<'_>, case: &Case, name: &str, followed: &Followed) -> f64 {
     let Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling } = *case;
     let greatest = |off: &dyn Fn(&Moment) -> f64| followed.samples.iter().map(|(_, at)| off(at)).fold(0.0, f64::max);
-    let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
-    let room = |v: f64| if name == "bounded_velocity" { v - 1.0 } else { tau_ceiling - steady(v) };
-    let (first, last) = (room(v_i), room(v_f));
-    // The logarithm of the distance from the bound over that at the start is `l x + c x (1 - x)`, `x = t/t_f`.
-    let (here, unit): (Distance<'_>, f64) = match name {
+    let shape = |x: f64| [x, x * (1.0 - x)];
+    let over_floor = |at: &Moment| [at.v - 1.0, at.v];
+    let under_ceiling = |at: &Moment| [tau_ceiling - at.friction, tau_ceiling.abs() + at.friction.abs()];
+    let (family, unit) = match name {
         "step" => return greatest(&|at| (at.v / v_f - 1.0).abs()),
         "cubic" => {
-            let cubic = Cubic::new(&case.transition, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f));
+            let cubic = smooth_cubic(case);
             // Theta and its slope are differences of numbers of the size of the greatest, and of that over the time.
             let noise =
                 |at: &Moment| 16.0 * f64::EPSILON / v_i.min(v_f) * (1.0 / at.theta + 1.0 / (t_f * at.theta * at.v));
             return greatest(&|at| ((at.v / cubic.velocity(place(at.t / t_f)) - 1.0).abs() - noise(at)).max(0.0));
         }
-        "bounded_velocity" => (&|at| (at.v - 1.0, at.v), -t_f * t_f),
+        "bounded_velocity" => {
+            let l = ((v_f - 1.0) / (v_i - 1.0)).ln();
+            (Exponential { t_f, first: v_i - 1.0, l, shape, distance: &over_floor, rounding: 0.0 }, -t_f * t_f)
+        }
         // A parabola, for which alpha is 0.
         _ if tau_ceiling == f64::INFINITY => {
-            verdict.compare(row, "alpha", Some(0.0), Some(1.0));
+            row.compare_relative("alpha", 0.0, 1.0);
             return 0.0;
         }
-        _ => (&|at| (tau_ceiling - at.friction, tau_ceiling.abs() + at.friction.abs()), 1.0),
+        _ => {
+            let [first, last] = [v_i, v_f].map(|v| tau_ceiling - (1.0 + (law.a - law.b) * v.ln()));
+            let rounding = (tau_ceiling.abs() + 1.0) / first.min(last);
+            (Exponential { t_f, first, l: (last / first).ln(), shape, distance: &under_ceiling, rounding }, 1.0)
+        }
     };
-    let l = (last / first).ln();
-    // Rounding of the distances at the ends.
-    let rounding = if name == "bounded_velocity" { 0.0 } else { (tau_ceiling.abs() + 1.0) / first.min(last) };
-    // The coefficient from one moment, and its rounding.
-    let coefficient = |at: &Moment| {
-        let ((distance, size), x) = (here(at), at.t / t_f);
-        let noise = 8.0 * f64::EPSILON * (size / distance.abs() + l.abs() + rounding);
-        (((distance / first).ln() - l * x) / (x * (1.0 - x)), noise / (x * (1.0 - x)))
-    };
-    let all =
-        followed.samples.iter().map(|(_, at)| coefficient(at)).filter(|(c, noise)| c.is_finite() && noise.is_finite());
-    let Some((c, noise)) = all.min_by(|x, y| x.1.total_cmp(&y.1)) else { return f64::INFINITY };
-    verdict.compare(row, "alpha", Some(c / unit), Some((c.abs() + noise / rtol) / unit.abs()));
-    greatest(&|at| {
-        let ((distance, size), x) = (here(at), at.t / t_f);
-        let expected = first * (l * x + c * x * (1.0 - x)).exp();
-        ((distance - expected).abs() / size - noise * x * (1.0 - x) * expected / size).max(0.0)
-    })
+    let Some([c, noise, off]) = family.fit(followed) else { return f64::INFINITY };
+    row.compare_relative("alpha", c / unit, (c.abs() + noise / row.context.rtol) / f64::abs(unit));
+    off
+}
+
+/// The cubic shortcut without jumps of the velocity: theta changes as `3 x^2 - 2 x^3`.
+fn smooth_cubic(&Case { transition, t_f, .. }: &Case) -> Cubic {
+    let Transition { v_i, v_f, .. } = transition;
+    Cubic::new(&transition, t_f, [0.0, -3.0 * (v_f - v_i) / (v_i * v_f)])
 }
 
 /// Relative distance from 0 below which the sign of a number is unknown. Chosen: a hundred times the tolerance of the integrator
@@ -119,10 +143,7 @@ fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static 
     let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
     let highest = steady(v_i).max(steady(v_f));
     match family {
-        "cubic" => {
-            let slack = Cubic::new(&case.transition, t_f, 0.0, -3.0 * (v_f - v_i) / (v_i * v_f)).slack();
-            settle("velocity", slack, 1.0)
-        }
+        "cubic" => settle("velocity", smooth_cubic(case).slack(), 1.0),
         "bounded_velocity" if v_f < v_i => spare,
         "bounded_friction" => match settle("friction", tau_ceiling - highest, highest.abs() + 1.0) {
             Some(None) if v_f > v_i && tau_ceiling.is_finite() => {

@@ -1,9 +1,7 @@
 //! `stability`: the roots of the characteristic polynomial with 32 digits: a real one by bisection, the others from what is left.
 
 use super::motion::bisect;
-use super::verdict::{Checked, Context, Verdict, axis, number, state_law, transition};
-use super::{arcsinh, hopf};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow, arcsinh, hopf};
 use crate::model::{Friction, Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 
@@ -36,26 +34,27 @@ fn modes([p, q]: [DoubleDouble; 2], other: Option<f64>) -> [f64; 3] {
 }
 
 /// Compares the borders of smooth optima: bisections of Legendre's condition `u G''/G' <= a/(tau + a)` at one velocity.
-fn smoothness(verdict: &mut Verdict, row: &Row, problem: &Transition) {
+fn smoothness(row: &mut CheckedRow<'_>, problem: &Transition) {
     let Law { a, b } = problem.law;
     let [slow, fast] = [problem.v_i.min(problem.v_f), problem.v_i.max(problem.v_f)].map(f64::ln);
     let steady = 1.0 + (a - b) * if b > a { slow } else { fast };
     // At 10 times the steady velocity.
     let (ln_u, tau) = (10.0_f64.ln(), steady + a * 10.0_f64.ln());
     let mixture = bisect(0.0, 1.0, |slip: f64| slip * (tau + a) <= a * (1.0 + slip * ln_u));
-    verdict.compare(row, "slip_fraction_smooth", (steady > 0.0).then_some(mixture), None);
+    row.compare("slip_fraction_smooth", (steady > 0.0).then_some(mixture));
     let tau = 1.0 - b * fast;
     let interpolated = bisect(0.0, 1.0, |slip: f64| {
         let power = (-(1.0 - slip) * fast).exp();
         power > slip && slip * (1.0 - slip) * (tau + a) <= a * (power - slip)
     });
-    verdict.compare(row, "law_eps_smooth", (tau > (b - a).max(0.0)).then_some(1.0 - interpolated), None);
+    row.compare("law_eps_smooth", (tau > (b - a).max(0.0)).then_some(1.0 - interpolated));
 }
 
-pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
-    let (problem, state, k, m) = (transition(row)?, state_law(row)?, axis(row, "k")?, axis(row, "m")?);
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, state, k, m) = (row.transition()?, row.state_law()?, row.axis("k")?, row.axis("m")?);
     let double = DoubleDouble::new;
-    let law = |v: f64| match context.friction {
+    let friction = row.context.friction;
+    let law = |v: f64| match friction {
         Friction::Log => problem.law,
         Friction::Regularised => arcsinh::linearised(&problem.law, v),
     };
@@ -65,44 +64,40 @@ pub fn check(row: &Row, context: &Context, rtol: f64) -> Checked {
     };
     let (a, b) = (double(law(problem.v_f).a), double(law(problem.v_f).b));
     let weakening = b - a;
-    let mut verdict = Verdict::default();
-    verdict.compare(row, "k_od", Some(weakening.high), None);
+    row.compare("k_od", weakening.high);
     for (k_c, stable, v) in [("k_c_i", "stable_i", problem.v_i), ("k_c_f", "stable_f", problem.v_f)] {
         let critical = critical(v);
-        verdict.compare(row, k_c, Some(critical.high), None);
+        row.compare(k_c, critical.high);
         let is_stable = !k.is_finite() || (double(k) - critical).high > 0.0;
-        verdict.compare_word(row, stable, if is_stable { "yes" } else { "no" });
+        row.compare_word(stable, if is_stable { "yes" } else { "no" });
     }
-    if context.friction == Friction::Regularised {
+    if friction == Friction::Regularised {
         // k is critical there, and no twice as great velocity is stable.
-        if let Some(v) = number(row, "v_crit") {
-            verdict.push("v_crit", (critical(v).high / k - 1.0).abs());
-            verdict.push("v_crit", if critical(2.0 * v).high < k { f64::INFINITY } else { 0.0 });
+        if let Some(v) = row.number("v_crit") {
+            row.push("v_crit", (critical(v).high / k - 1.0).abs());
+            row.push("v_crit", if critical(2.0 * v).high < k { f64::INFINITY } else { 0.0 });
         }
     } else {
         let square = (a * (double(k) / weakening - double(1.0)) / double(m)).high;
         let exists = weakening.high > 0.0 && square > 0.0 && square.is_finite();
-        verdict.compare(row, "v_crit", exists.then(|| square.sqrt()), None);
+        row.compare("v_crit", exists.then(|| square.sqrt()));
         let mass = m * problem.v_f * problem.v_f;
-        let hopf = match number(row, "law_eps") {
+        let hopf = match row.number("law_eps") {
             Some(eps) => hopf::Point::interpolated(eps, problem.law, mass),
             None => hopf::Point::new(state, problem.law, mass),
         };
-        hopf.compare_kind(&mut verdict, row);
-        hopf.compare_coefficient(&mut verdict, row, rtol);
-        smoothness(&mut verdict, row, &problem);
+        hopf.compare_kind(row);
+        hopf.compare_coefficient(row);
+        smoothness(row, &problem);
     }
-    eigenvalues(&mut verdict, row, law(problem.v_f), (k, m, problem.v_f));
-    Ok(verdict)
+    eigenvalues(row, law(problem.v_f), (k, m, problem.v_f));
+    Ok(())
 }
 
 /// Compares the eigenvalues at steady sliding with `v`, from the roots of the characteristic polynomial.
-fn eigenvalues(verdict: &mut Verdict, row: &Row, law: Law, (k, m, v): (f64, f64, f64)) {
+fn eigenvalues(row: &mut CheckedRow<'_>, law: Law, (k, m, v): (f64, f64, f64)) {
     if !k.is_finite() {
-        for column in ["growth_rate", "frequency", "decay_rate"] {
-            verdict.compare(row, column, None, None);
-        }
-        return;
+        return ["growth_rate", "frequency", "decay_rate"].iter().for_each(|column| row.compare(column, None));
     }
     let double = DoubleDouble::new;
     let a = double(law.a);
@@ -121,8 +116,8 @@ fn eigenvalues(verdict: &mut Verdict, row: &Row, law: Law, (k, m, v): (f64, f64,
     };
     // At the critical stiffness the growth rate is 0 and has no relative error.
     let modulus = growth.hypot(frequency);
-    verdict.compare(row, "growth_rate", Some(v * growth), Some(v * growth.abs().max(1e-20 * modulus)));
+    row.compare_relative("growth_rate", v * growth, v * growth.abs().max(1e-20 * modulus));
     // Near a double root the frequency is the square root of a small difference.
-    verdict.compare(row, "frequency", Some(v * frequency), Some(v * modulus));
-    verdict.compare(row, "decay_rate", (m > 0.0).then_some(v * decay), None);
+    row.compare_relative("frequency", v * frequency, v * modulus);
+    row.compare("decay_rate", (m > 0.0).then_some(v * decay));
 }

@@ -1,10 +1,8 @@
 //! `step_response`: the traced response obeys the equations; its extremes, its settling and its cycles are read off the trace.
 
-use super::hopf;
 use super::motion::{Followed, bisect};
 use super::route::integrate;
-use super::verdict::{Checked, Context, Verdict, axis, number, state_law, transition, word};
-use crate::dataset::Row;
+use super::{Checked, CheckedRow, hopf};
 use crate::model::{Law, StateLaw, Transition};
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::SteadySliding;
@@ -93,40 +91,32 @@ impl Events {
     }
 }
 
-pub fn check(row: &Row, _: &Context, rtol: f64) -> Checked {
-    let (problem, state, k, m) = (transition(row)?, state_law(row)?, axis(row, "k")?, axis(row, "m")?);
-    let mut verdict = Verdict::default();
+pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, state, k, m) = (row.transition()?, row.state_law()?, row.axis("k")?, row.axis("m")?);
     let Transition { law, v_i, v_f } = problem;
-    let hopf = hopf::Point::new(state, law, m * v_f * v_f);
-    hopf.compare_coefficient(&mut verdict, row, rtol);
-    if number(row, "t_end").is_some() {
-        verdict.miss("t_end, up to which a response was integrated");
+    hopf::Point::new(state, law, m * v_f * v_f).compare_coefficient(row);
+    if row.number("t_end").is_some() {
+        row.miss("t_end, up to which a response was integrated");
     }
     if !(k.is_finite() && v_i != v_f) {
-        verdict.compare_word(row, "outcome", "settled");
-        verdict.compare_word(row, "stick_slip", "no");
-        ["v_peak", "v_trough"].iter().for_each(|column| verdict.compare(row, column, Some(v_f), None));
-        verdict.compare(row, "settling_time", Some(0.0), Some(1.0));
-        CYCLE.iter().chain(&["t_peak"]).for_each(|column| verdict.compare(row, column, None, None));
-        return Ok(verdict);
+        row.compare_word("outcome", "settled");
+        row.compare_word("stick_slip", "no");
+        ["v_peak", "v_trough"].iter().for_each(|column| row.compare(column, v_f));
+        row.compare_relative("settling_time", 0.0, 1.0);
+        CYCLE.iter().chain(&["t_peak"]).for_each(|column| row.compare(column, None));
+        return Ok(());
     }
     let step = VelocityStep { state_law: state, transition: problem, k, m };
-    let Some(infinite) = diverges(&step) else {
-        verdict.miss("steps without mass that an explicit integrator does not decide");
-        return Ok(verdict);
-    };
-    verdict.status(row, infinite);
+    let infinite = diverges(&step).ok_or("steps without mass that an explicit integrator does not decide")?;
+    let has_numbers = row.compare_feasible(!infinite);
     if infinite {
-        verdict.compare_word(row, "outcome", "diverged");
+        row.compare_word("outcome", "diverged");
     }
-    if infinite || word(row, STATUS) == Some("infeasible") {
-        return Ok(verdict);
+    if has_numbers {
+        let followed = follow(row, step)?;
+        compare(row, &step, &followed);
     }
-    match follow(&mut verdict, step, rtol) {
-        Ok(followed) => compare(&mut verdict, row, &problem, (k, m), &followed, rtol),
-        Err(reason) => verdict.miss(reason),
-    }
-    Ok(verdict)
+    Ok(())
 }
 
 /// Pieces of unit length over which a step without mass is followed, and the distance from steady sliding at which it has settled.
@@ -174,7 +164,8 @@ fn diverges(
 const CYCLE: [&str; 3] = ["period", "cycle_peak", "cycle_trough"];
 
 /// The traced response, with its errors as differences; the reason where there is none.
-fn follow(verdict: &mut Verdict, step: VelocityStep, rtol: f64) -> Result<Followed, &'static str> {
+fn follow(row: &mut CheckedRow<'_>, step: VelocityStep) -> Result<Followed, &'static str> {
+    let rtol = row.context.rtol;
     let response = step.respond(rtol).1.filter(|response| response.outcome != Outcome::Undecided);
     let response = response.ok_or("undecided responses")?;
     let more = response.cycle.map_or(0.0, |cycle| MORE_CYCLES * cycle.period);
@@ -184,8 +175,8 @@ fn follow(verdict: &mut Verdict, step: VelocityStep, rtol: f64) -> Result<Follow
     let motion = motion.ok_or("responses of more than 10,000 steps")?;
     let VelocityStep { state_law, transition: Transition { law, .. }, k, m } = step;
     let followed = Followed::under(state_law, Box::new(motion), &SpringBlock { law, k, m }, 0);
-    verdict.push("motion", followed.equation);
-    verdict.push("control", followed.control);
+    row.push("motion", followed.equation);
+    row.push("control", followed.control);
     Ok(followed)
 }
 
@@ -223,21 +214,15 @@ impl LastCycle {
 }
 
 /// Compares the numbers of a response with its trace.
-fn compare(
-    verdict: &mut Verdict,
-    row: &Row,
-    &Transition { law, v_i, v_f }: &Transition,
-    (k, m): (f64, f64),
-    followed: &Followed,
-    rtol: f64,
-) {
+fn compare(row: &mut CheckedRow<'_>, step: &VelocityStep, followed: &Followed) {
+    let (&VelocityStep { transition: Transition { law, v_i, v_f }, k, m, .. }, rtol) = (step, row.context.rtol);
     let events = Events::of(followed, v_f);
     let [peak, trough] = range(&events, v_f, (0.0, f64::INFINITY));
     // Effect of an error of the spring force on a quasi-static ln v.
     let felt = (k / law.a * (m * v_f * v_f / law.a)).sqrt().max(1.0).sqrt();
     let lowest = trough.v.min(v_i);
     if lowest.ln().abs() > 100.0 * felt * rtol {
-        verdict.compare_word(row, STATUS, if lowest < 1.0 { "below_bound" } else { "ok" });
+        row.compare_word(STATUS, if lowest < 1.0 { "below_bound" } else { "ok" });
     }
     // A response does not settle at unstable steady sliding.
     let settled = events.settled.filter(|_| SteadySliding::new(law, k, m, v_f).is_stable());
@@ -246,29 +231,29 @@ fn compare(
     // A limit cycle that is approached slowly has greater extremes than any cycle of the trace.
     if settled.is_some() || vague <= MAX_CYCLE_RTOLS {
         let vague = if settled.is_some() { 1.0 } else { vague };
-        verdict.compare(row, "v_peak", Some(peak.v), Some(vague * peak.v));
-        verdict.compare_number(row, "v_trough", trough.v, vague * felt * trough.v);
+        row.compare_relative("v_peak", peak.v, vague * peak.v);
+        row.compare_number("v_trough", trough.v, vague * felt * trough.v);
         let overshoot = peak.v / v_f - 1.0;
         if overshoot > MIN_OVERSHOOT {
-            verdict.compare_number(row, "t_peak", peak.t, (peak.t + 1.0 / v_f) / overshoot.min(1.0));
+            row.compare_number("t_peak", peak.t, (peak.t + 1.0 / v_f) / overshoot.min(1.0));
         }
     }
-    verdict.compare_word(row, "outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
-    verdict.compare_word(row, "stick_slip", if settled.is_some() { "no" } else { "yes" });
+    row.compare_word("outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
+    row.compare_word("stick_slip", if settled.is_some() { "no" } else { "yes" });
     if let Some((entry, speed)) = settled {
         if events.margin > EDGE_RTOLS * rtol {
             let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;
-            verdict.compare_number(row, "settling_time", entry.t, scale);
+            row.compare_number("settling_time", entry.t, scale);
         } else {
-            verdict.miss("settling times that depend on rounding");
+            row.miss("settling times that depend on rounding");
         }
-        return CYCLE.iter().for_each(|column| verdict.compare(row, column, None, None));
+        return CYCLE.iter().for_each(|column| row.compare(column, None));
     }
-    verdict.compare(row, "settling_time", None, None);
+    row.compare("settling_time", None);
     let Some(LastCycle { period, top, bottom, .. }) = last.filter(|_| vague <= MAX_CYCLE_RTOLS) else {
-        return verdict.miss("cycles that are approached slowly");
+        return row.miss("cycles that are approached slowly");
     };
-    verdict.compare(row, "period", Some(period), Some(vague * period));
-    verdict.compare(row, "cycle_peak", Some(top), Some(vague * top));
-    verdict.compare_number(row, "cycle_trough", bottom, vague * felt * bottom);
+    row.compare_relative("period", period, vague * period);
+    row.compare_relative("cycle_peak", top, vague * top);
+    row.compare_number("cycle_trough", bottom, vague * felt * bottom);
 }

@@ -1,12 +1,10 @@
 //! An optimal transition under bounds: which durations and ceilings are feasible.
 
+use super::CheckedRow;
 use super::route::integrate;
-use super::verdict::{Verdict, number, word};
-use crate::dataset::Row;
 use crate::model::{Transition, friction_margin};
-use crate::protocol::optimal::{Bounds, Optimum};
-use crate::protocol::{Motion, Solved, optimal};
-use crate::table::STATUS;
+use crate::protocol::optimal::Bounds;
+use crate::protocol::{Motion, Status, optimal};
 
 /// A transition to steady sliding in a given time, under bounds.
 #[derive(Debug, Clone, Copy)]
@@ -40,13 +38,19 @@ impl Task {
         Task { problem: *problem, theta: None, t_f, bounds: bounds.into() }
     }
 
-    /// The optimum and its motion.
-    pub fn solve(&self) -> (Solved<Optimum>, Option<Box<dyn Motion>>) {
+    /// That of a row.
+    pub fn of(row: &CheckedRow<'_>) -> Result<Task, &'static str> {
+        Ok(Task::new(&row.transition()?, row.axis("t_f")?, row.bounds()))
+    }
+
+    /// The status of the optimum, and its motion.
+    pub fn solve(&self) -> (Status, Option<Box<dyn Motion>>) {
         let Task { ref problem, theta, t_f, bounds } = *self;
-        match theta {
+        let (solved, motion) = match theta {
             Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, MOTION_RTOL),
             None => optimal::motion(problem, t_f, bounds, MOTION_RTOL),
-        }
+        };
+        (solved.status, motion)
     }
 
     /// State variable at the start.
@@ -165,26 +169,17 @@ impl Task {
         }
     }
 
-    /// Compares whether the row is infeasible; true where it has no optimum.
-    pub fn compare_status(&self, verdict: &mut Verdict, row: &Row) -> bool {
-        let feasible = self.is_feasible();
-        match feasible {
-            None => verdict.miss("it is too close to the border of what is feasible"),
-            Some(feasible) => verdict.status(row, !feasible),
-        }
-        feasible == Some(false) || word(row, STATUS) == Some("infeasible")
-    }
-
     /// Compares the least feasible numbers and the reason of an infeasible row.
-    pub fn compare_limits(&self, verdict: &mut Verdict, row: &Row, rtol: f64) {
+    pub fn compare_limits(&self, row: &mut CheckedRow<'_>) {
         if let Some(limits) = self.limits() {
             let least = limits.ok().map(|(least, _)| least);
-            verdict.compare(row, "t_least", least, (least == Some(0.0)).then_some(self.t_f));
+            let scale = least.filter(|least| *least != 0.0).unwrap_or(self.t_f);
+            row.compare_relative("t_least", least, scale.abs());
             match limits {
-                _ if word(row, STATUS) != Some("infeasible") => verdict.demand(row, "bound", false),
-                Err(ceiling) => ceiling.into_iter().for_each(|ceiling| verdict.compare_word(row, "bound", ceiling)),
+                _ if !row.has_status("infeasible") => row.demand("bound", false),
+                Err(ceiling) => ceiling.into_iter().for_each(|ceiling| row.compare_word("bound", ceiling)),
                 Ok((least, _)) => {
-                    verdict.compare_word(row, "bound", if self.t_f <= least { "too_fast" } else { "too_slow" });
+                    row.compare_word("bound", if self.t_f <= least { "too_fast" } else { "too_slow" });
                 }
             }
         }
@@ -192,12 +187,13 @@ impl Task {
         let by_tau = |tau_ceiling: f64| Task { bounds: Bounds { tau_ceiling, ..self.bounds }, ..*self }.is_feasible();
         type Under<'a> = &'a dyn Fn(f64) -> Option<bool>;
         let ceilings: [(&str, Under<'_>); 2] = [("v_ceiling_least", &by_v), ("tau_ceiling_least", &by_tau)];
+        let margin = 10.0 * row.context.rtol;
         for (column, under) in ceilings {
-            under(f64::INFINITY).into_iter().for_each(|exists| verdict.demand(row, column, exists));
-            let Some(least) = number(row, column) else { continue };
+            under(f64::INFINITY).into_iter().for_each(|exists| row.demand(column, exists));
+            let Some(least) = row.number(column) else { continue };
             // Ten `rtol` above a least ceiling a protocol exists, ten below none does.
-            let [below, above] = [-10.0 * rtol, 10.0 * rtol].map(|part| under(least + part * least.abs()));
-            verdict.judge(column, below != Some(true) && above != Some(false), "least feasible");
+            let [below, above] = [-margin, margin].map(|part| under(least + part * least.abs()));
+            row.judge(column, below != Some(true) && above != Some(false), "least feasible");
         }
     }
 }

@@ -1,12 +1,21 @@
-//! Rows of a dataset in the units of the model, in which they are checked.
+//! A row of a dataset in the units of the model, in which it is checked.
 
+use crate::dataset::frame::Heading;
 use crate::dataset::{Cell, Row};
 use crate::grid::{Quantity, Scale};
 use crate::model::Units;
 use crate::table::{Kind, Table};
 
-/// The rows of `table` in the units of the model; `relative` determines which of `alpha_2`, `alpha_3` are given relative to the duration.
-pub fn scale(rows: &mut [(u64, Row)], table: &Table, units: &Units, relative: [bool; 2]) {
+/// Which of `alpha_2`, `alpha_3` are given relative to the duration, by the headings of their table in `units`.
+pub fn relative(headings: &[Heading], units: &Units) -> [bool; 2] {
+    [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
+        let heading = headings.iter().find(|heading| heading.name == alpha.name());
+        heading.is_some_and(|heading| heading.unit == units.name(alpha.unit(Scale::Duration)))
+    })
+}
+
+/// Converts a row of `table` to the units of the model; `relative` determines which of `alpha_2`, `alpha_3` are given relative to the duration.
+pub fn scale(row: &mut Row, table: &Table, units: &Units, relative: [bool; 2]) {
     let unit = |quantity: Quantity| {
         let is_relative = match quantity {
             Quantity::Alpha2 => relative[0],
@@ -22,18 +31,15 @@ pub fn scale(rows: &mut [(u64, Row)], table: &Table, units: &Units, relative: [b
             _ => None,
         })
     };
-    for (_, row) in rows {
-        // Only one family has a parameter with a dimension.
-        let is_rate =
-            row.iter().any(|(name, cell)| name == "family" && *cell == Cell::Word("bounded_velocity".to_owned()));
-        for (name, cell) in row {
-            let Cell::Number(value) = cell else { continue };
-            if let Some(unit) = unit_of(name) {
-                *value = units.scaled(unit, *value);
-            }
-            if is_rate && name == "alpha" {
-                *value /= units.size("v_0/l") * units.size("v_0/l");
-            }
+    // Only one family has a parameter with a dimension.
+    let is_rate = row.iter().any(|(name, cell)| name == "family" && *cell == Cell::Word("bounded_velocity".to_owned()));
+    for (name, cell) in row {
+        let Cell::Number(value) = cell else { continue };
+        if let Some(unit) = unit_of(name) {
+            *value = units.scaled(unit, *value);
+        }
+        if is_rate && name == "alpha" {
+            *value /= units.size("v_0/l") * units.size("v_0/l");
         }
     }
 }

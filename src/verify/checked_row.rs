@@ -1,0 +1,218 @@
+//! A row under check: its cells, the differences found, and the skipped checks.
+
+use crate::dataset::{Cell, Row};
+use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::protocol::optimal::Bounds;
+use crate::table::STATUS;
+
+/// The context of a check: properties of the sweep.
+#[derive(Debug, Clone, Copy)]
+pub struct Context {
+    pub bounded: bool,
+    pub friction: Friction,
+    /// Whether `alpha_2`, `alpha_3` are given relative to `t_f`.
+    pub relative: [bool; 2],
+    /// The accuracy of the table.
+    pub rtol: f64,
+}
+
+/// A row under check.
+#[derive(Debug)]
+pub struct CheckedRow<'a> {
+    cells: &'a Row,
+    pub context: Context,
+    pub differences: Vec<Difference>,
+    /// The reasons for skipped checks.
+    pub unchecked: Vec<&'static str>,
+}
+
+/// The end of a check, or the reason why the rest is not checked.
+pub type Checked = Result<(), &'static str>;
+
+/// One comparison.
+#[derive(Debug)]
+pub struct Difference {
+    pub column: &'static str,
+    /// Relative difference; infinite where only one route has a number.
+    pub size: f64,
+    /// The value of the independent route, and what `size` is relative to unless that is this value, as text.
+    pub expected: String,
+}
+
+impl<'a> CheckedRow<'a> {
+    /// The row of these cells after its `check`.
+    pub fn new(cells: &'a Row, context: Context, check: impl FnOnce(&mut CheckedRow<'a>) -> Checked) -> CheckedRow<'a> {
+        let mut row = CheckedRow { cells, context, differences: Vec::new(), unchecked: Vec::new() };
+        if let Err(reason) = check(&mut row) {
+            row.miss(reason);
+        }
+        row
+    }
+
+    fn cell(&self, column: &str) -> Option<&'a Cell> {
+        self.cells.iter().find(|(name, _)| name == column).map(|(_, cell)| cell)
+    }
+
+    pub fn number(&self, column: &str) -> Option<f64> {
+        self.cell(column)?.number()
+    }
+
+    pub fn word(&self, column: &str) -> Option<&'a str> {
+        match self.cell(column)? {
+            Cell::Word(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    pub fn has_status(&self, name: &str) -> bool {
+        self.word(STATUS) == Some(name)
+    }
+
+    /// Whether a column is written, and null.
+    pub fn is_missing(&self, column: &str) -> bool {
+        self.cell(column) == Some(&Cell::Missing)
+    }
+
+    /// Whether a column with such a name is written.
+    pub fn has_column(&self, start: &str) -> bool {
+        self.cells.iter().any(|(name, _)| name.starts_with(start))
+    }
+
+    /// The number of an axis.
+    pub fn axis(&self, name: &str) -> Result<f64, &'static str> {
+        self.number(name).ok_or("an axis is missing")
+    }
+
+    /// The evolution law of the state: ageing without such a column.
+    pub fn state_law(&self) -> Result<StateLaw, &'static str> {
+        self.word("law").map_or(Some(StateLaw::Ageing), StateLaw::find).ok_or("the law is unknown")
+    }
+
+    pub fn law(&self) -> Result<Law, &'static str> {
+        Ok(Law { a: self.axis("a")?, b: self.axis("b")? })
+    }
+
+    pub fn transition(&self) -> Result<Transition, &'static str> {
+        Ok(Transition { law: self.law()?, v_i: self.axis("v_i")?, v_f: self.axis("v_f")? })
+    }
+
+    /// The bounds of its optimum.
+    pub fn bounds(&self) -> Bounds {
+        let ceiling = |name| self.number(name).unwrap_or(f64::INFINITY);
+        let (v_ceiling, tau_ceiling) = (ceiling("v_ceiling"), ceiling("tau_ceiling"));
+        Bounds { floor: self.context.bounded, v_ceiling, tau_ceiling }
+    }
+
+    /// `alpha_2 t_f` and `alpha_3 t_f^2`; `None` if one was not written.
+    pub fn coefficients(&self, t_f: f64) -> Option<[f64; 2]> {
+        let [relative_2, relative_3] = self.context.relative;
+        let (alpha_2, alpha_3) = (self.number("alpha_2")?, self.number("alpha_3")?);
+        Some([if relative_2 { alpha_2 } else { alpha_2 * t_f }, if relative_3 { alpha_3 } else { alpha_3 * t_f * t_f }])
+    }
+
+    /// Records a relative difference that has no counterpart in the row.
+    pub fn push(&mut self, column: &'static str, size: f64) {
+        self.differences.push(Difference { column, size, expected: "0".to_owned() });
+    }
+
+    /// Records the differences and the skipped checks of another row.
+    pub fn extend(&mut self, other: CheckedRow<'_>) {
+        self.differences.extend(other.differences);
+        other.unchecked.into_iter().for_each(|reason| self.miss(reason));
+    }
+
+    /// Records the reason for a skipped check.
+    pub fn miss(&mut self, reason: &'static str) {
+        if !self.unchecked.contains(&reason) {
+            self.unchecked.push(reason);
+        }
+    }
+
+    /// Compares the column, if written, with `expected`.
+    pub fn compare(&mut self, column: &'static str, expected: impl Into<Option<f64>>) {
+        let expected = expected.into();
+        self.compare_relative(column, expected, expected.map_or(1.0, f64::abs));
+    }
+
+    /// Compares the column, if written, with `expected`, in units of `scale`.
+    pub fn compare_relative(&mut self, column: &'static str, expected: impl Into<Option<f64>>, scale: f64) {
+        let expected = expected.into();
+        // A result may have the name of an axis, and comes after it.
+        let Some((_, cell)) = self.cells.iter().rev().find(|(name, _)| name == column) else { return };
+        let difference = match (cell, expected) {
+            (Cell::Missing, None) => 0.0,
+            // Also where both are infinite.
+            (Cell::Number(found), Some(expected)) if *found == expected => 0.0,
+            // Below the normal numbers digits are missing.
+            (Cell::Number(found), Some(expected)) => (found - expected).abs() / scale.max(f64::MIN_POSITIVE),
+            _ => f64::INFINITY,
+        };
+        // A number that cannot be compared is an error, not an agreement.
+        let size = if difference.is_nan() { f64::INFINITY } else { difference };
+        let expected = match expected {
+            Some(expected) if (scale / expected.abs() - 1.0).abs() > SAME_SCALE => {
+                format!("{expected:?}, relative to {scale:.3e}")
+            }
+            Some(expected) => format!("{expected:?}"),
+            None => "nothing".to_owned(),
+        };
+        self.differences.push(Difference { column, size, expected });
+    }
+
+    /// Compares a number, if there is one.
+    pub fn compare_number(&mut self, column: &'static str, expected: f64, scale: f64) {
+        if self.number(column).is_some() {
+            self.compare_relative(column, expected, scale);
+        }
+    }
+
+    pub fn compare_word(&mut self, column: &'static str, expected: &str) {
+        if let Some(cell) = self.cell(column) {
+            self.judge(column, matches!(cell, Cell::Word(found) if found == expected), expected);
+        }
+    }
+
+    /// Records an error of a column unless it `holds`, with the expectation as text.
+    pub fn judge(&mut self, column: &'static str, holds: bool, expected: &str) {
+        let size = if holds { 0.0 } else { f64::INFINITY };
+        self.differences.push(Difference { column, size, expected: expected.to_owned() });
+    }
+
+    /// Records an error if a column that must have a value is null, or the reverse.
+    pub fn demand(&mut self, column: &'static str, exists: bool) {
+        if self.cells.iter().any(|(name, cell)| name == column && (*cell != Cell::Missing) != exists) {
+            self.judge(column, false, if exists { "a number" } else { "nothing" });
+        }
+    }
+
+    /// Compares whether the status reports friction below 0 with the least friction along the path.
+    pub fn compare_friction(&mut self, least: f64) {
+        if least.abs() > MIN_FRICTION {
+            self.judge_status(least < 0.0, [NEGATIVE, "not negative_friction"]);
+        }
+    }
+
+    /// Compares whether the row is infeasible, unless rounding decides; whether it has numbers to compare.
+    pub fn compare_feasible(&mut self, feasible: impl Into<Option<bool>>) -> bool {
+        let feasible = feasible.into();
+        match feasible {
+            None => self.miss("it is too close to the border of what is feasible"),
+            Some(feasible) => self.judge_status(!feasible, ["infeasible", "not infeasible"]),
+        }
+        feasible != Some(false) && !self.has_status("infeasible")
+    }
+
+    fn judge_status(&mut self, expected: bool, [name, other]: [&'static str; 2]) {
+        let holds = self.word(STATUS).is_some_and(|status| (status == name) == expected);
+        self.judge(STATUS, holds, if expected { name } else { other });
+    }
+}
+
+/// Relative difference of a scale from the number below which it is not stated. Chosen: it does not change the shown digits of a difference.
+const SAME_SCALE: f64 = 1e-3;
+
+/// The status of a path with friction below 0.
+pub const NEGATIVE: &str = "negative_friction";
+
+/// Least friction, in mu_0 sigma, that an independent route distinguishes from 0. Chosen: above the errors of every route.
+const MIN_FRICTION: f64 = 1e-9;
