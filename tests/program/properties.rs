@@ -53,7 +53,7 @@ fn all(rows: &RowIndex) -> Vec<Vec<u64>> {
 /// Legal values of an axis, as likely near either end of its range as inside, to the last bit.
 fn value(name: &'static str) -> BoxedStrategy<f64> {
     let domain = Quantity::from_name(name).expect("is an axis").domain();
-    let ((least, _), greatest) = (domain.least(), domain.greatest());
+    let (least, greatest) = (domain.least, domain.greatest);
     let inside = move |bits: u64| f64::from_bits(least.to_bits() + bits % (greatest.to_bits() - least.to_bits()) + 1);
     if least < 0.0 {
         return prop_oneof![least..greatest, -1.0..1.0, Just(0.0), Just(-0.0), Just(least), Just(greatest)].boxed();
