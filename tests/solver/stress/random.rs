@@ -49,7 +49,7 @@ impl Random {
     /// Log-uniform over the legal domain.
     pub fn legal(&mut self, quantity: Quantity) -> f64 {
         let domain = quantity.domain();
-        self.between(domain.least().0, domain.greatest())
+        self.between(domain.least, domain.greatest)
     }
 
     /// One of them.
@@ -92,7 +92,7 @@ impl Random {
         if self.chance(0.1) {
             1.0 + self.between(3e-16, 1e-12)
         } else {
-            1.0 + self.between(1e-12, Quantity::InitialVelocity.domain().greatest() - 1.0)
+            1.0 + self.between(1e-12, Quantity::InitialVelocity.domain().greatest - 1.0)
         }
     }
 
@@ -130,7 +130,7 @@ impl Random {
             kind if kind < 0.8 => least + self.between(1e-9, 1e9) * fast,
             _ => self.legal(Quantity::Time),
         };
-        self.near(t_f).clamp(Quantity::Time.domain().least().0, Quantity::Time.domain().greatest())
+        self.near(t_f).clamp(Quantity::Time.domain().least, Quantity::Time.domain().greatest)
     }
 
     /// A block, one in ten without mass, on a spring, one in ten rigid; one in three at the critical stiffness of a

@@ -34,7 +34,7 @@ fn draw(random: &mut Random) -> Point {
     let tau_ceiling = match random.uniform() {
         kind if kind < 0.2 && ends > 0.0 => random.near(ends),
         kind if kind < 0.3 => f64::INFINITY,
-        _ => ends + random.between(1e-12, Quantity::FrictionCeiling.domain().greatest()),
+        _ => ends + random.between(1e-12, Quantity::FrictionCeiling.domain().greatest),
     };
     Point { case: Case { transition, t_f, tau_ceiling }, rtol: random.rtol() }
 }
