@@ -184,6 +184,16 @@ impl VisitorMut for Check<'_> {
                 "write the condition in HAVING, after GROUP BY; for OVER, filter a subquery: FROM (SELECT ...) AS t WHERE ...",
             );
         }
+        if is_empty(&select.group_by)
+            && let Some(aggregate) = select.projection.iter().filter_map(expression).find_map(first_plain_aggregate)
+            && let Some(column) = select.projection.iter().find_map(first_bare_column)
+        {
+            // polars would repeat the aggregate beside every row.
+            return self.refuse(
+                format!("`{column}` is neither in GROUP BY nor in an aggregate"),
+                format!("write {aggregate} alone or with GROUP BY; beside every row, write {aggregate} OVER ()"),
+            );
+        }
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
         let mut items = select.projection.iter().filter_map(expression).chain(&select.qualify);
         if is_grouped && let Some(window) = items.find_map(first_window) {
@@ -288,6 +298,57 @@ fn first_window(expression: &Expr) -> Option<String> {
 /// The first aggregate or window function of an expression.
 fn first_aggregate(expression: &Expr) -> Option<String> {
     first_function(expression, |function| function.over.is_some() || is_aggregate(function))
+}
+
+/// The first aggregate of an expression without OVER.
+fn first_plain_aggregate(expression: &Expr) -> Option<String> {
+    first_function(expression, |function| function.over.is_none() && is_aggregate(function))
+}
+
+/// The first column of an item of SELECT outside aggregates and subqueries, as text.
+fn first_bare_column(item: &SelectItem) -> Option<String> {
+    #[derive(Default)]
+    struct Search {
+        depth: u32,
+        found: Option<String>,
+    }
+    impl Search {
+        fn depth_of(expression: &Expr) -> u32 {
+            let is_plain = |function: &Function| function.over.is_none() && is_aggregate(function);
+            u32::from(matches!(expression, Expr::Function(function) if is_plain(function)))
+        }
+    }
+    impl VisitorMut for Search {
+        type Break = ();
+
+        fn pre_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
+            self.depth += 1;
+            ControlFlow::Continue(())
+        }
+
+        fn post_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
+            self.depth -= 1;
+            ControlFlow::Continue(())
+        }
+
+        fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+            if self.depth == 0 && matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_)) {
+                self.found = Some(expression.to_string());
+                return ControlFlow::Break(());
+            }
+            self.depth += Search::depth_of(expression);
+            ControlFlow::Continue(())
+        }
+
+        fn post_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
+            self.depth -= Search::depth_of(expression);
+            ControlFlow::Continue(())
+        }
+    }
+    let Some(expression) = expression(item) else { return Some(item.to_string()) };
+    let mut search = Search::default();
+    walk(&mut expression.clone(), &mut search);
+    search.found
 }
 
 /// Whether a function reduces the rows of a group to one value.

@@ -24,6 +24,13 @@ const SAME_TIME_RTOL: f64 = 8.0 * f64::EPSILON;
 /// Steps of an interval of the motion; a chord is compared with the motion between them. Chosen: half an interval keeps its samples.
 const STEPS: usize = 8;
 
+/// Least length of an interval that is halved, relative to its end. Chosen: its samples are still apart.
+const MIN_INTERVAL: f64 = 64.0 * f64::EPSILON;
+
+/// Greatest time, relative to the duration, of an interval that cannot be halved: there the pieces of a motion meet with the errors of their
+/// durations. Chosen: the default `rtol`.
+const MAX_GAP: f64 = 1e-10;
+
 /// Greatest number of moments; a motion with more cannot be resolved. Chosen: a few hundred megabytes.
 const MAX_MOMENTS: usize = 1 << 21;
 
@@ -91,6 +98,13 @@ impl Samples {
                 if samples.len() > MAX_MOMENTS {
                     return None;
                 }
+                continue;
+            }
+            if last.s - first.s < MIN_INTERVAL * last.s {
+                if last.moment.t - first.moment.t > MAX_GAP * motion.duration() {
+                    return None;
+                }
+                samples.push(last);
                 continue;
             }
             let halve = |half: &[CurvePoint]| {

@@ -197,6 +197,16 @@ fn wrong_questions_are_answered_with_the_known_names() {
             "`gap` is neither in GROUP BY nor in an aggregate",
             "add it to GROUP BY, or write min(gap) or max(gap)",
         ),
+        (
+            "SELECT t_f, min(gap) FROM best_cubic",
+            "`t_f` is neither in GROUP BY nor in an aggregate",
+            "write min(gap) alone or with GROUP BY; beside every row, write min(gap) OVER ()",
+        ),
+        (
+            "SELECT *, 1 + count(*) FROM best_cubic",
+            "`*` is neither in GROUP BY nor in an aggregate",
+            "write count(*) alone or with GROUP BY; beside every row, write count(*) OVER ()",
+        ),
         ("DROP TABLE best_cubic", "DROP is refused: `query` reads and never writes", "write one SELECT"),
     ] {
         let expected = (1, format!("error: {found}\n{tables}  help: {help}\n"));

@@ -128,6 +128,15 @@ fn csv_reads_back_the_same_numbers_and_parquet_too() {
 }
 
 #[test]
+fn regress_pulses_whose_durations_do_not_sum_to_the_duration_are_traced() {
+    let pulses = ["--law", "prz", "--t-f", "1.3", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "3.1"];
+    let csv = csv(&[&["optimal", "--v-ceiling", "1000"], &pulses]);
+    let rows: Vec<&str> = csv.lines().skip(1).collect();
+    assert!(rows.len() > 100 && rows.len() < 1000, "{}", rows.len());
+    assert!(rows.last().is_some_and(|row| row.starts_with("1.3,3.1,")), "{csv}");
+}
+
+#[test]
 fn points_are_equally_spaced() {
     let csv = csv(&[&["step"], UP, &["--points", "3"]]);
     let times: Vec<&str> = csv.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
