@@ -36,6 +36,9 @@ pub struct Route {
     arc: Option<Timed>,
 }
 
+/// A part of an arc: from which place to which.
+type Stretch<'a> = (&'a Timed, [f64; 2]);
+
 impl Route {
     /// The route along `extremal`, or along the floor arc alone, in time `t_f`.
     pub(super) fn new(problem: &Problem, t_f: f64, extremal: Option<Extremal>) -> Route {
@@ -127,7 +130,7 @@ impl Route {
     }
 
     /// Between two points: from which time to which on the floor arc, and from which place to which on the arc.
-    fn stretches(&self, from: PathPoint, to: PathPoint) -> (Option<[f64; 2]>, Option<(&Timed, [f64; 2])>) {
+    fn stretches(&self, from: PathPoint, to: PathPoint) -> (Option<[f64; 2]>, Option<Stretch<'_>>) {
         let held = match (from, to) {
             (PathPoint::Held(start), PathPoint::Held(end)) => Some([start, end]),
             (PathPoint::Held(start), PathPoint::Moving(_)) => Some([start, self.floor.time]),

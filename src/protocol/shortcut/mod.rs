@@ -143,8 +143,11 @@ pub struct Family {
     /// [`Family::solve`] for a case inside the domain.
     solve: fn(&Case, f64, &mut SolverStats) -> Result<Shortcut, Obstacle>,
     /// [`Family::motion`] for a case inside the domain.
-    motion: fn(&Case, f64) -> Result<Box<dyn Motion>, Obstacle>,
+    motion: fn(&Case, f64) -> PathOrObstacle,
 }
+
+/// The path of a member, or why there is none.
+type PathOrObstacle = Result<Box<dyn Motion>, Obstacle>;
 
 impl Family {
     /// Member that solves `case`, every number to the relative tolerance `rtol`; adds to `stats`.
