@@ -256,10 +256,12 @@ fn expression(item: &SelectItem) -> Option<&Expr> {
     }
 }
 
-/// The first function outside subqueries for which `wanted` holds, as text.
-fn first_function(expression: &Expr, wanted: fn(&Function) -> bool) -> Option<String> {
+/// The first part of an expression that is `wanted`, as text, outside subqueries and outside parts for which `hides` holds.
+fn first_part(expression: &Expr, wanted: fn(&Expr) -> bool, hides: fn(&Expr) -> bool) -> Option<String> {
     struct Search {
-        wanted: fn(&Function) -> bool,
+        wanted: fn(&Expr) -> bool,
+        hides: fn(&Expr) -> bool,
+        /// Number of subqueries and hiding parts around the visited one.
         depth: u32,
         found: Option<String>,
     }
@@ -277,78 +279,55 @@ fn first_function(expression: &Expr, wanted: fn(&Function) -> bool) -> Option<St
         }
 
         fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
-            match expression {
-                Expr::Function(function) if self.depth == 0 && (self.wanted)(function) => {
-                    self.found = Some(function.to_string());
-                    ControlFlow::Break(())
-                }
-                _ => ControlFlow::Continue(()),
-            }
-        }
-    }
-    let mut search = Search { wanted, depth: 0, found: None };
-    walk(&mut expression.clone(), &mut search);
-    search.found
-}
-
-fn first_window(expression: &Expr) -> Option<String> {
-    first_function(expression, |function| function.over.is_some())
-}
-
-/// The first aggregate or window function of an expression.
-fn first_aggregate(expression: &Expr) -> Option<String> {
-    first_function(expression, |function| function.over.is_some() || is_aggregate(function))
-}
-
-/// The first aggregate of an expression without OVER.
-fn first_plain_aggregate(expression: &Expr) -> Option<String> {
-    first_function(expression, |function| function.over.is_none() && is_aggregate(function))
-}
-
-/// The first column of an item of SELECT outside aggregates and subqueries, as text.
-fn first_bare_column(item: &SelectItem) -> Option<String> {
-    #[derive(Default)]
-    struct Search {
-        depth: u32,
-        found: Option<String>,
-    }
-    impl Search {
-        fn depth_of(expression: &Expr) -> u32 {
-            let is_plain = |function: &Function| function.over.is_none() && is_aggregate(function);
-            u32::from(matches!(expression, Expr::Function(function) if is_plain(function)))
-        }
-    }
-    impl VisitorMut for Search {
-        type Break = ();
-
-        fn pre_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
-            self.depth += 1;
-            ControlFlow::Continue(())
-        }
-
-        fn post_visit_query(&mut self, _: &mut Query) -> ControlFlow<()> {
-            self.depth -= 1;
-            ControlFlow::Continue(())
-        }
-
-        fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
-            if self.depth == 0 && matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_)) {
+            if self.depth == 0 && (self.wanted)(expression) {
                 self.found = Some(expression.to_string());
                 return ControlFlow::Break(());
             }
-            self.depth += Search::depth_of(expression);
+            self.depth += u32::from((self.hides)(expression));
             ControlFlow::Continue(())
         }
 
         fn post_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
-            self.depth -= Search::depth_of(expression);
+            self.depth -= u32::from((self.hides)(expression));
             ControlFlow::Continue(())
         }
     }
-    let Some(expression) = expression(item) else { return Some(item.to_string()) };
-    let mut search = Search::default();
+    let mut search = Search { wanted, hides, depth: 0, found: None };
     walk(&mut expression.clone(), &mut search);
     search.found
+}
+
+fn is_window(expression: &Expr) -> bool {
+    matches!(expression, Expr::Function(function) if function.over.is_some())
+}
+
+/// Whether an expression is an aggregate without OVER.
+fn is_plain_aggregate(expression: &Expr) -> bool {
+    matches!(expression, Expr::Function(function) if function.over.is_none() && is_aggregate(function))
+}
+
+/// The first window function of an expression.
+fn first_window(expression: &Expr) -> Option<String> {
+    first_part(expression, is_window, |_| false)
+}
+
+/// The first aggregate or window function of an expression.
+fn first_aggregate(expression: &Expr) -> Option<String> {
+    first_part(expression, |part| is_window(part) || is_plain_aggregate(part), |_| false)
+}
+
+/// The first aggregate of an expression without OVER.
+fn first_plain_aggregate(expression: &Expr) -> Option<String> {
+    first_part(expression, is_plain_aggregate, |_| false)
+}
+
+/// The first column of an item of SELECT outside aggregates and subqueries, as text.
+fn first_bare_column(item: &SelectItem) -> Option<String> {
+    let is_column = |part: &Expr| matches!(part, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
+    match expression(item) {
+        Some(expression) => first_part(expression, is_column, is_plain_aggregate),
+        None => Some(item.to_string()),
+    }
 }
 
 /// Whether a function reduces the rows of a group to one value.
