@@ -188,10 +188,10 @@ impl VisitorMut for Check<'_> {
             && let Some(aggregate) = select.projection.iter().filter_map(expression).find_map(first_plain_aggregate)
             && let Some(column) = select.projection.iter().find_map(first_bare_column)
         {
-            // polars would repeat the aggregate beside every row.
+            // polars would repeat the aggregate in every row.
             return self.refuse(
                 format!("`{column}` is neither in GROUP BY nor in an aggregate"),
-                format!("write {aggregate} alone or with GROUP BY; beside every row, write {aggregate} OVER ()"),
+                format!("write {aggregate} alone or with GROUP BY; for every row, write {aggregate} OVER ()"),
             );
         }
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);

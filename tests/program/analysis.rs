@@ -200,12 +200,12 @@ fn wrong_questions_are_answered_with_the_known_names() {
         (
             "SELECT t_f, min(gap) FROM best_cubic",
             "`t_f` is neither in GROUP BY nor in an aggregate",
-            "write min(gap) alone or with GROUP BY; beside every row, write min(gap) OVER ()",
+            "write min(gap) alone or with GROUP BY; for every row, write min(gap) OVER ()",
         ),
         (
             "SELECT *, 1 + count(*) FROM best_cubic",
             "`*` is neither in GROUP BY nor in an aggregate",
-            "write count(*) alone or with GROUP BY; beside every row, write count(*) OVER ()",
+            "write count(*) alone or with GROUP BY; for every row, write count(*) OVER ()",
         ),
         ("DROP TABLE best_cubic", "DROP is refused: `query` reads and never writes", "write one SELECT"),
     ] {
