@@ -65,8 +65,13 @@ def run_bullets(text, folder, variables):
         printed = run(["slipsweep", "run", str(REPOSITORY / sweep)], folder, variables)
         for number in re.findall(r"\d[\d,.]*\d(?:e-?\d+)?", re.sub(r"`[^`]*`| in [\d.]+ s\b", "", bullet)):
             # A number with an exponent is rounded.
-            digits = re.escape(number).replace("e", r"\d*e")
-            if not re.search(rf"(?<![\d,.]){digits}(?![\d,])", printed):
+            def states(other):
+                if "e" not in number:
+                    return other == number
+                decimals = len(number.split("e")[0].partition(".")[2])
+                return "e" in other and f"{float(other):.{decimals}e}" == f"{float(number):.{decimals}e}"
+
+            if not any(map(states, re.findall(r"\d[\d,.]*\d(?:e-?\d+)?", printed))):
                 sys.exit(f"README.md: {sweep} does not print {number}:\n{printed}")
 
 
