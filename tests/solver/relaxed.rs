@@ -217,6 +217,7 @@ fn outside_of_the_domain_there_are_no_numbers() {
         assert_eq!(status(law, &up, 0.1, 80.0), Status::Infeasible);
         assert_eq!(status(law, &up, 0.1, 79.0), Status::Infeasible);
         assert_eq!(status(law, &up, 1e-6, 600.0), Status::Infeasible);
+        assert!(slopes(law, &up, 1e-6, 600.0).is_none());
         assert_eq!(status(law, &transition(0.03, 0.05, 80.0, 4.0), 10.0, 60.0), Status::Ok);
         assert_eq!(status(law, &transition(0.03, 0.05, 80.0, 70.0), 10.0, 60.0), Status::Unproven);
         assert_eq!(status(law, &transition(0.03, 0.05, 80.0, 80.0), 1.0, 80.0), Status::Ok);
