@@ -25,7 +25,7 @@ use crate::trace::{
     self, Absence, COLUMNS, Disturbance, Disturbed, Parameter, Pathless, Protocol, RANGE_RTOL, Times, Trace,
     TracedPath, VALUE_RTOL,
 };
-use crate::verify::{relative, scale};
+use crate::verify::scale;
 
 /// Arguments of `trace`.
 #[derive(Debug, clap::Args)]
@@ -584,7 +584,10 @@ impl Arguments {
         let units = units(&spec.model)?;
         let friction = friction(&spec.model)?;
         let headings = frame::headings(&part).map_err(Failure::failed)?.0;
-        let relative = relative(&headings, &units);
+        let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
+            let heading = headings.iter().find(|heading| heading.name == alpha.name());
+            heading.is_some_and(|heading| heading.unit == units.name(alpha.unit(Scale::Duration)))
+        });
         let definition = table::find(name);
         let mut scaled = written.clone();
         if let Some(definition) = definition {

@@ -93,7 +93,8 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
     let file = file::open(path).map_err(|error| wrong(path, error))?;
     let metadata = metadata_limits::footer(&file).map_err(|error| wrong(path, error))?;
     let footer = metadata.file_metadata();
-    let schema = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())
+    let schema = guarded(|| parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()))
+        .ok_or_else(|| wrong(path, "its schema is damaged"))?
         .map_err(|error| wrong(path, error))?;
     let heading = |field: &arrow_schema::FieldRef| {
         let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();

@@ -25,6 +25,8 @@ pub struct CheckedQuery {
     pub query: Box<Query>,
     /// The known units of its columns, by name.
     pub units: Columns,
+    /// A fault of a query whose names are valid.
+    pub mixed: Option<InvalidQuery>,
 }
 
 /// The fault of a query, and its help.
@@ -85,7 +87,7 @@ impl CheckedQuery {
                 }
             });
         };
-        let mut check = Check { sources, tables: HashSet::new(), windows: HashSet::new(), fault: None };
+        let mut check = Check { sources, tables: HashSet::new(), windows: HashSet::new(), fault: None, mixed: None };
         walk(query.as_mut(), &mut check);
         if let Some(fault) = check.fault {
             return Err(fault);
@@ -96,7 +98,7 @@ impl CheckedQuery {
         let tables = sources.iter().map(|source| (source.name.clone(), columns(source))).collect();
         let units = units(&query, &tables);
         walk(query.as_mut(), &mut PolarsDialect { words });
-        Ok(CheckedQuery { query, units })
+        Ok(CheckedQuery { query, units, mixed: check.mixed })
     }
 }
 
@@ -108,6 +110,8 @@ struct Check<'a> {
     /// Names of windows with an order.
     windows: HashSet<String>,
     fault: Option<InvalidQuery>,
+    /// A column and an aggregate in one SELECT without GROUP BY.
+    mixed: Option<InvalidQuery>,
 }
 
 impl Check<'_> {
@@ -189,10 +193,10 @@ impl VisitorMut for Check<'_> {
             && let Some(column) = select.projection.iter().find_map(first_bare_column)
         {
             // polars would repeat the aggregate in every row.
-            return self.refuse(
+            self.mixed = Some(InvalidQuery::new(
                 format!("`{column}` is neither in GROUP BY nor in an aggregate"),
                 format!("write {aggregate} alone or with GROUP BY; for every row, write {aggregate} OVER ()"),
-            );
+            ));
         }
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
         let mut items = select.projection.iter().filter_map(expression).chain(&select.qualify);
@@ -323,7 +327,11 @@ fn first_plain_aggregate(expression: &Expr) -> Option<String> {
 
 /// The first column of an item of SELECT outside aggregates and subqueries, as text.
 fn first_bare_column(item: &SelectItem) -> Option<String> {
-    let is_column = |part: &Expr| matches!(part, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
+    let is_column = |part: &Expr| match part {
+        Expr::Identifier(_) | Expr::CompoundIdentifier(_) => true,
+        Expr::Function(function) => is_one_of("columns", function),
+        _ => false,
+    };
     match expression(item) {
         Some(expression) => first_part(expression, is_column, is_plain_aggregate),
         None => Some(item.to_string()),
@@ -333,11 +341,15 @@ fn first_bare_column(item: &SelectItem) -> Option<String> {
 /// Whether a function reduces the rows of a group to one value.
 pub fn is_aggregate(function: &Function) -> bool {
     is_one_of(AGGREGATE_FUNCTIONS, function)
-        || is_one_of("array_agg corr count covar covar_samp first last string_agg var_samp", function)
+        || is_one_of(
+            "array_agg corr count covar covar_pop covar_samp first group_concat last listagg string_agg",
+            function,
+        )
 }
 
 /// Aggregates that polars applies to a constant as if it were one row.
-const AGGREGATE_FUNCTIONS: &str = "avg max mean median min quantile_cont quantile_disc stddev stdev sum var variance";
+const AGGREGATE_FUNCTIONS: &str = "avg max mean median min quantile_cont quantile_disc stddev stddev_samp stdev stdev_samp sum total var var_samp \
+    variance";
 
 /// The condition of a join that keeps rows without a match.
 fn outer_condition(join: &JoinOperator) -> Option<&Expr> {

@@ -98,6 +98,9 @@ impl Tables {
         let (frame, schema) = guarded(planned)
             .unwrap_or_else(|| Err(PolarsError::ComputeError("the engine does not support this query".into())))
             .map_err(|error| self.explain(sql, &error))?;
+        if let Some(InvalidQuery { found, help }) = checked.mixed {
+            return Err(self.refuse(found, &help));
+        }
         let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
         let unit = |name: &String| {
             let known = checked.units.iter().find(|(column, _)| column == name);

@@ -26,12 +26,13 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use crate::dataset::{Folder, Manifest, Row, frame};
+use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
+use crate::grid::{Quantity, Scale};
 use crate::model::{Friction, Units};
-use crate::sweep::{self, Spec};
+use crate::sweep::{self, AxisSpec, Spec};
 use crate::table;
 use checked_row::{Checked, CheckedRow, Context, Difference};
-pub(crate) use units::{relative, scale};
+pub(crate) use units::scale;
 
 /// Difference above which a number is an error, in units of `rtol`. Chosen: room for the errors of the second route.
 pub const MAX_DIFFERENCE_RTOLS: f64 = 10.0;
@@ -93,11 +94,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
         let rtol = rtol.unwrap_or(spec.accuracy.rtol);
         let (mut rows, missing) = sample::rows(&folder, manifest, table, sample, seed).map_err(VerifyError)?;
-        let headings = match rows.first() {
-            Some((row, _)) => frame::headings(&folder.part(&table.name, row / table.rows_per_part)).map(|all| all.0),
-            None => Ok(Vec::new()),
-        };
-        let relative = relative(&headings.map_err(|error| VerifyError(error.to_string()))?, &units);
+        let relative = relative(&spec, &folder, table)?;
         let friction = sweep::friction(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
         let bounded = spec.model.velocity_bound && friction == Friction::Log;
         let context = Context { bounded, friction, relative, rtol };
@@ -140,6 +137,28 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         audits.push(audit);
     }
     Ok(audits)
+}
+
+/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration. The spec states it, since an edited part may have lost its units.
+fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
+    let has_points = spec.blocks().any(|(_, block)| block.points.is_some());
+    // Only the parts contain the points of a file.
+    let headings = match folder.parts_there(table).first() {
+        Some(&part) if has_points => {
+            frame::headings(&folder.part(&table.name, part)).map_err(|error| VerifyError(error.to_string()))?.0
+        }
+        _ => Vec::new(),
+    };
+    Ok([Quantity::Alpha2, Quantity::Alpha3].map(|coefficient| {
+        let (name, unit) = (coefficient.name(), coefficient.unit(Scale::Duration));
+        match spec.axis(name) {
+            Some(AxisSpec::Form(form)) => form.unit.as_deref() == Some(unit),
+            Some(_) => false,
+            // In any system of units.
+            None if has_points => headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")),
+            None => true,
+        }
+    }))
 }
 
 impl Audit {

@@ -1,18 +1,9 @@
 //! A row of a dataset in the units of the model, in which it is checked.
 
-use crate::dataset::frame::Heading;
 use crate::dataset::{Cell, Row};
 use crate::grid::{Quantity, Scale};
 use crate::model::Units;
 use crate::table::{Kind, Table};
-
-/// Which of `alpha_2`, `alpha_3` are given relative to the duration, by the headings of their table in `units`.
-pub fn relative(headings: &[Heading], units: &Units) -> [bool; 2] {
-    [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
-        let heading = headings.iter().find(|heading| heading.name == alpha.name());
-        heading.is_some_and(|heading| heading.unit == units.name(alpha.unit(Scale::Duration)))
-    })
-}
 
 /// Converts a row of `table` to the units of the model; `relative` determines which of `alpha_2`, `alpha_3` are given relative to the duration.
 pub fn scale(row: &mut Row, table: &Table, units: &Units, relative: [bool; 2]) {

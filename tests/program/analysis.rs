@@ -203,6 +203,11 @@ fn wrong_questions_are_answered_with_the_known_names() {
             "write min(gap) alone or with GROUP BY; for every row, write min(gap) OVER ()",
         ),
         (
+            "SELECT COLUMNS('v_.*'), stddev_samp(gap) FROM best_cubic",
+            "`COLUMNS('v_.*')` is neither in GROUP BY nor in an aggregate",
+            "write stddev_samp(gap) alone or with GROUP BY; for every row, write stddev_samp(gap) OVER ()",
+        ),
+        (
             "SELECT *, 1 + count(*) FROM best_cubic",
             "`*` is neither in GROUP BY nor in an aggregate",
             "write count(*) alone or with GROUP BY; for every row, write count(*) OVER ()",
