@@ -327,11 +327,6 @@ fn first_plain_aggregate(expression: &Expr) -> Option<String> {
 
 /// The first column of an item of SELECT outside aggregates and subqueries, as text.
 fn first_bare_column(item: &SelectItem) -> Option<String> {
-    let is_column = |part: &Expr| match part {
-        Expr::Identifier(_) | Expr::CompoundIdentifier(_) => true,
-        Expr::Function(function) => is_one_of("columns", function),
-        _ => false,
-    };
     match expression(item) {
         Some(expression) => first_part(expression, is_column, is_plain_aggregate),
         None => Some(item.to_string()),
@@ -377,22 +372,18 @@ fn is_equalities(condition: &Expr) -> bool {
     }
 }
 
+/// Whether an expression is a column, or all or some columns.
+fn is_column(expression: &Expr) -> bool {
+    match expression {
+        Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Wildcard(_) | Expr::QualifiedWildcard(..) => true,
+        Expr::Function(function) => is_one_of("columns", function),
+        _ => false,
+    }
+}
+
 /// Whether an expression contains no column.
 fn is_constant(expression: &Expr) -> bool {
-    struct Columns;
-    impl VisitorMut for Columns {
-        type Break = ();
-
-        fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
-            match expression {
-                Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Wildcard(_) | Expr::QualifiedWildcard(..) => {
-                    ControlFlow::Break(())
-                }
-                _ => ControlFlow::Continue(()),
-            }
-        }
-    }
-    walk(&mut expression.clone(), &mut Columns)
+    first_part(expression, is_column, |_| false).is_none()
 }
 
 /// The visitor that names the columns of every SELECT, also for use in ORDER BY.

@@ -151,6 +151,7 @@ impl Tables {
         let is_internal = line.contains("Query {")
             || line.starts_with("join type")
             || line.contains("activate '")
+            || line.contains("'Expr: ")
             || line.contains(" { ") && line.contains("expression");
         if is_internal {
             let found =
