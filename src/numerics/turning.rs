@@ -107,12 +107,33 @@ pub fn turning_lanes<const N: usize>(w: &[f64; N]) -> Turnings<N> {
         turns |= (w > -1.0) & (w < 1.0);
     }
     let mut found = Turnings { ln_u: [0.0; N], u: [0.0; N], excess: [0.0; N], over: [0.0; N], under: [0.0; N] };
+    // Each loop calls its formula by name: through a parameter the formula would not be inlined, and its lanes not vectorised.
     match (rises, turns, falls) {
-        (false, _, false) => found.fill(w, near),
-        (false, false, true) => found.fill(w, falling),
-        (false, true, true) => found.fill(w, near_or_falling),
-        (true, false, false) => found.fill(w, rising),
-        (true, ..) => found.fill(w, any),
+        (false, _, false) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, near(w));
+            }
+        }
+        (false, false, true) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, falling(w));
+            }
+        }
+        (false, true, true) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, near_or_falling(w));
+            }
+        }
+        (true, false, false) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, rising(w));
+            }
+        }
+        (true, ..) => {
+            for (i, &w) in w.iter().enumerate() {
+                found.set(i, any(w));
+            }
+        }
     }
     found
 }
@@ -131,13 +152,10 @@ fn any(w: f64) -> Lane {
 }
 
 impl<const N: usize> Turnings<N> {
-    /// Evaluates a formula at every argument.
     #[inline(always)]
-    fn fill(&mut self, w: &[f64; N], formula: impl Fn(f64) -> Lane) {
-        for (i, &w) in w.iter().enumerate() {
-            let Lane { ln_u, u, excess, over, under } = formula(w);
-            (self.ln_u[i], self.u[i], self.excess[i], self.over[i], self.under[i]) = (ln_u, u, excess, over, under);
-        }
+    fn set(&mut self, i: usize, place: Lane) {
+        (self.ln_u[i], self.u[i], self.excess[i]) = (place.ln_u, place.u, place.excess);
+        (self.over[i], self.under[i]) = (place.over, place.under);
     }
 }
 
