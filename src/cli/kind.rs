@@ -104,6 +104,9 @@ impl Kind {
             Kind::Table => ("the folder of a table", name(above(path), "dataset")),
             Kind::Part => ("a part of a table", name(above(path).and_then(|table| above(&table)), "dataset")),
             Kind::Manifest => ("the manifest of a dataset", name(above(path), "folder")),
+            Kind::Folder if fs::read_dir(path).is_err() => {
+                ("a folder that cannot be read", "check its permissions".to_owned())
+            }
             Kind::Folder => ("a folder without a dataset", ours()),
             Kind::Spec => {
                 ("a spec", format!("`slipsweep run {shown}` computes the dataset {}; name that folder", results(path)))

@@ -303,9 +303,7 @@ impl BlockDraft<'_> {
         match first_wrong(block, quantity, |value| legal(units, quantity, scale, value).is_err()) {
             Some(None) => Ok(()),
             Some(Some((value, place))) => {
-                let place: Vec<String> =
-                    place.iter().map(|(axis, value)| format!("{} = {value:?}", axis.name())).collect();
-                let place = if place.is_empty() { String::new() } else { format!(" at {}", place.join(", ")) };
+                let place = at(&place);
                 let legal = legal(units, quantity, scale, value).err().unwrap_or_default();
                 let help = "correct the expression, or drop such points with `where`";
                 refuse(key, format!("`{text}` is {value:?}{place}"), legal, help)
@@ -318,6 +316,20 @@ impl BlockDraft<'_> {
     fn key_of_expression(self, quantity: Quantity) -> String {
         format!("{}axes.{}.expr", self.prefix, quantity.name())
     }
+}
+
+/// A point, in words.
+fn at(point: &[(Quantity, f64)]) -> String {
+    let values: Vec<String> = point.iter().map(|(axis, value)| format!("{} = {value:?}", axis.name())).collect();
+    if values.is_empty() { String::new() } else { format!(" at {}", values.join(", ")) }
+}
+
+/// The first computed axis of `block` that is NaN at a point, whether the condition keeps it or not, in words.
+pub fn nan(block: &Block) -> Option<String> {
+    let all = Block { condition: None, ..block.clone() };
+    let first = |axis: Quantity| Some((axis, first_wrong(&all, axis, f64::is_nan)??.1));
+    let (axis, point) = block.derived.iter().find_map(|derived| first(derived.quantity))?;
+    Some(format!("`{}`, NaN{}", axis.name(), at(&point)))
 }
 
 fn values(count: u64) -> String {

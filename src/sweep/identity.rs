@@ -98,14 +98,23 @@ impl Sweep {
         let other_value = there.iter().find(|(known, _)| known == key).map_or("nothing", |(_, value)| value);
         let is_written = |key: &str| [self, other].iter().any(|sweep| read::value(&sweep.text, key).is_some());
         let key = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
-        // The default value.
-        let written = |sweep: &Sweep, value: &str| match read::value(&sweep.text, key) {
-            Some(text) => shown(&text, MAX_SHOWN_CHARS).into_owned(),
-            None => shown(value, MAX_SHOWN_CHARS).into_owned(),
-        };
+        // Or the default value.
+        let written = |sweep: &Sweep, value: &str| read::value(&sweep.text, key).unwrap_or_else(|| value.to_owned());
+        let [here, there] = differing([written(self, value), written(other, other_value)]);
         let line = read::line(&self.text, key).map_or_else(String::new, |line| format!(" (line {line})"));
-        Some([format!("{key} = {}{line}", written(self, value)), format!("{key} = {}", written(other, other_value))])
+        Some([format!("{key} = {here}{line}"), format!("{key} = {there}")])
     }
+}
+
+/// Two values in a message, long ones from shortly before their difference on.
+fn differing(values: [String; 2]) -> [String; 2] {
+    let same = values[0].chars().zip(values[1].chars()).take_while(|(here, there)| here == there).count();
+    let longest = values.each_ref().map(|value| value.chars().count()).into_iter().fold(0, usize::max);
+    let start = same.saturating_sub(MAX_SHOWN_CHARS / 2).min(longest.saturating_sub(MAX_SHOWN_CHARS));
+    values.map(|value| {
+        let rest: String = value.chars().skip(start).collect();
+        format!("{}{}", if start > 0 { "..." } else { "" }, shown(&rest, MAX_SHOWN_CHARS))
+    })
 }
 
 /// The inputs of a block for the `needed` axes, and for the axes in their expressions and in the condition.

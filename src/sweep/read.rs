@@ -54,10 +54,18 @@ fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
         let expected = "key = value, [table] or # comment";
         let line = span.as_ref().map_or(0, |span| line_of(text, span.start));
         let line = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
-        SpecError::new("", format!("not TOML: {message}"), expected, help_for_line(line))
+        let help = if message.starts_with("missing comma") { MISSING_COMMA } else { help_for_line(line) };
+        SpecError::new("", format!("not TOML: {message}"), expected, help)
     };
     SpecError { line: span.map(|span| line_of(text, span.start)), ..fault }
 }
+
+/// The help for two values of a list without a comma.
+const MISSING_COMMA: &str = "write a comma between two values";
+
+/// The help for a number with a unit.
+const NUMBER_ALONE: &str =
+    "write the number alone; it is in SI units, such as m/s, if [model] has `units = \"si\"` and the scales";
 
 /// The help for a line that is not TOML.
 fn help_for_line(line: &str) -> &'static str {
@@ -66,18 +74,23 @@ fn help_for_line(line: &str) -> &'static str {
     let has_decimal_comma = value.match_indices(',').any(|(at, _)| {
         is_digit(value[..at].chars().next_back()) && is_digit(value[at + 1..].chars().next()) && !value.contains('[')
     });
+    let words: Vec<&str> = value.split('#').next().unwrap_or_default().split_whitespace().collect();
+    let lacks_comma =
+        words.windows(2).any(|two| is_digit(two[0].chars().next_back()) && is_digit(two[1].chars().next()));
     if line.contains(['\u{201c}', '\u{201d}', '\u{2018}', '\u{2019}']) {
         "write straight quotes, \""
     } else if has_decimal_comma {
         "write a decimal point, not a comma"
     } else if value.contains("space(") {
         "write a range as { linspace = [first, last, count] } or { geomspace = [first, last, count] }"
+    } else if value.starts_with(['[', '{']) && lacks_comma {
+        MISSING_COMMA
     } else if value.is_empty() && line.contains('=') {
         "write a value after `=`"
     } else if value.parse::<f64>().is_ok() {
         "correct the line, or the one before"
     } else if is_digit(value.chars().next()) && !value.contains(['*', '/']) {
-        "write a number without a unit, since `units` in [model] determines the units"
+        NUMBER_ALONE
     } else if value.starts_with(['[', '{', '"', '\'']) && !value.contains("expr") || !line.contains('=') {
         "correct the line"
     } else {
@@ -88,14 +101,18 @@ fn help_for_line(line: &str) -> &'static str {
 /// The help for text in place of a number.
 pub fn help_for_word(word: &str) -> String {
     let word = word.trim();
+    let unit = word.trim_start_matches(|c: char| c.is_ascii_digit() || ".eE+-".contains(c)).trim_start();
+    let name = unit.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap_or_default();
+    let is_unit =
+        !name.is_empty() && unit.len() < word.len() && (name.len() == 1 || Quantity::from_name(name).is_none());
     if word.parse::<f64>().is_ok() {
         "remove the quotes".to_owned()
+    } else if is_unit {
+        NUMBER_ALONE.to_owned()
     } else if word.contains(['*', '/', '+', '('])
         || word.split_whitespace().any(|part| Quantity::from_name(part).is_some())
     {
         format!("write an expression as {{ expr = {word:?} }}")
-    } else if word.starts_with(|c: char| c.is_ascii_digit()) {
-        "write the number alone, without quotes; `units` in [model] determines its unit".to_owned()
     } else {
         "write a number".to_owned()
     }

@@ -155,6 +155,23 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
 }
 
 #[test]
+fn regress_long_values_are_shown_where_they_differ() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let times = |last: f64| (1..60).map(f64::from).chain([last]).map(|t_f| format!("{t_f:.1}")).collect::<Vec<_>>();
+    let spec = |last: f64| {
+        let path = folder.path().join("spec.toml");
+        let text = format!("name = \"test\"\n[axes]\nt_f = [{}]\n{MATERIAL}[tables.optimal]\n", times(last).join(", "));
+        fs::write(&path, text).expect("is writable");
+        Sweep::load(&path).expect("is legal")
+    };
+    run(&spec(60.0), folder.path(), 1);
+    let reported = refusal(&spec(61.5), folder.path());
+    let same = "axes.t_f = ...42.0, 43.0, 44.0, 45.0, 46.0, 47.0, 48.0, 49.0, 50.0, 51.0, 52.0, 53.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 6";
+    let shown = format!("\n  in the spec: {same}1.5] (line 3)\n  in the dataset: {same}0.0]\n");
+    assert!(reported.contains(&shown), "{reported}");
+}
+
+#[test]
 fn other_points_in_the_same_file_are_another_spec() {
     let folder = tempfile::tempdir().expect("is writable");
     let path = folder.path().join("spec.toml");
