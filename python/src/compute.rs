@@ -99,7 +99,7 @@ fn given<'a, 'py: 'a>(values: impl Iterator<Item = (Quantity, &'a Bound<'py, PyA
 
 /// A number, a word, a list of words, or a contiguous array of doubles.
 fn numbers(quantity: Quantity, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let place = |text: &str| word(quantity, text).map_err(|error| error::spec(&error));
+    let place = |text: &str| word(quantity.name(), quantity, text).map_err(|error| error::spec(&error));
     let is_number = || !quantity.words().is_empty();
     if value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>() {
         if is_number() {

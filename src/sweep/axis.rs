@@ -72,6 +72,20 @@ fn quoted(words: &[&str]) -> String {
     words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
 }
 
+/// The index of `word`, found at `key`, among those of `quantity`.
+///
+/// # Errors
+///
+/// The fault of an unknown word, or of a word for a number.
+pub fn word(key: &str, quantity: Quantity, word: &str) -> Result<f64, SpecError> {
+    let words = quantity.words();
+    match words.iter().position(|known| *known == word) {
+        Some(place) => Ok(place as f64),
+        None if words.is_empty() => refuse(key, format!("found string {word:?}"), "a number", help_for_word(word)),
+        None => Err(unknown(key.to_owned(), quantity.name(), word, &words)),
+    }
+}
+
 /// An axis while it is read.
 #[derive(Clone, Copy)]
 struct AxisDraft<'a> {
@@ -94,13 +108,7 @@ impl AxisDraft<'_> {
     fn value(self, key: &str, value: &AxisValue) -> Result<f64, SpecError> {
         let words = self.quantity.words();
         match value {
-            AxisValue::Word(word) if words.is_empty() => {
-                refuse(key, format!("found string {word:?}"), "a number", help_for_word(word))
-            }
-            AxisValue::Word(word) => match words.iter().position(|known| known == word) {
-                Some(place) => Ok(place as f64),
-                None => Err(unknown(key.to_owned(), self.quantity.name(), word, &words)),
-            },
+            AxisValue::Word(found) => word(key, self.quantity, found),
             AxisValue::Number(number) if !words.is_empty() => {
                 let expected = format!("one of {}", quoted(&words));
                 refuse(key, format!("found {number:?}"), expected, "write the word in quotes")

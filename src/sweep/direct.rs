@@ -7,10 +7,9 @@ use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
 
 use super::check::{self, Request, Sweep};
-use super::error::{Faults, SpecError, refuse, unknown};
+use super::error::{Faults, SpecError, refuse};
 use super::friction;
 use super::laws;
-use super::read::help_for_word;
 use super::spec::{AccuracySpec, ModelSpec};
 use super::units::{doubt, help, legal, units};
 use crate::dataset::{Layout, batch};
@@ -37,22 +36,6 @@ pub struct Direct<'a> {
     pub rtol: Option<f64>,
     /// The columns; by default all that are not optional.
     pub columns: Option<&'a [String]>,
-}
-
-/// The index of `word` among those of `quantity`.
-///
-/// # Errors
-///
-/// The fault of an unknown word, or of a word for a number.
-pub fn word(quantity: Quantity, word: &str) -> Result<f64, SpecError> {
-    let words = quantity.words();
-    match words.iter().position(|known| *known == word) {
-        Some(place) => Ok(place as f64),
-        None if words.is_empty() => {
-            refuse(quantity.name(), format!("found string {word:?}"), "a number", help_for_word(word))
-        }
-        None => Err(unknown(quantity.name().to_owned(), quantity.name(), word, &words)),
-    }
 }
 
 /// The error of rows in memory.

@@ -19,11 +19,12 @@ mod shard;
 mod spec;
 mod units;
 
+pub use axis::word;
 pub use batches::Batches;
 #[cfg(feature = "cli")]
 pub(crate) use check::check_name;
 pub use check::{Request, Sweep};
-pub use direct::{Direct, Given, RowsError, word};
+pub use direct::{Direct, Given, RowsError};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
 pub use estimate::{Estimate, Estimates, estimate, sizes};

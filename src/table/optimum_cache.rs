@@ -84,23 +84,18 @@ pub fn work_error(point: &Point, bounds: &Bounds, optimum: &Optimum, work: &mut 
 /// The least work of `point` under its law and velocity ceiling, with its error bound if `wanted`. Adds the solver statistics to `work`.
 pub fn least_work(job: &Job<'_>, point: &Point, wanted: bool, work: &mut RunStats) -> Solved<(f64, f64)> {
     let (transition, t_f, v_ceiling) = (transition(point), point[Quantity::Time], point[Quantity::VelocityCeiling]);
-    if point.state_law() != StateLaw::Ageing {
+    let solved = if point.state_law() != StateLaw::Ageing {
         let solved = relaxed::solve(point.state_law(), &transition, t_f, v_ceiling);
-        *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
-        let value = solved.value.map(|found| (found.optimum.work, relaxed::work_error(&found, &transition, t_f)));
-        return Solved { status: solved.status, value, stats: solved.stats };
-    }
-    if job.friction == Friction::Regularised {
-        let solved = arcsinh::solve(&transition, t_f).map(|found| (found.optimum.work, f64::NAN));
-        *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
-        return solved;
-    }
-    let bounds = Bounds::new(job.bounded).with_v_ceiling(v_ceiling);
-    let solved = optimal::solve(&transition, t_f, bounds, job.rtol);
+        solved.map(|found| (found.optimum.work, relaxed::work_error(&found, &transition, t_f)))
+    } else if job.friction == Friction::Regularised {
+        arcsinh::solve(&transition, t_f).map(|found| (found.optimum.work, f64::NAN))
+    } else {
+        let bounds = Bounds::new(job.bounded).with_v_ceiling(v_ceiling);
+        let mut error = |optimum: &Optimum| if wanted { work_error(point, &bounds, optimum, work) } else { f64::NAN };
+        optimal::solve(&transition, t_f, bounds, job.rtol).map(|optimum| (optimum.work, error(&optimum)))
+    };
     *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
-    let mut error = |optimum: &Optimum| if wanted { work_error(point, &bounds, optimum, work) } else { f64::NAN };
-    let value = solved.value.map(|optimum| (optimum.work, error(&optimum)));
-    Solved { status: solved.status, value, stats: solved.stats }
+    solved
 }
 
 /// The least work of any protocol, and the gap of one protocol to it.

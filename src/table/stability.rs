@@ -21,11 +21,9 @@ struct Row {
     /// The interpolated law, NaN without.
     law_eps: f64,
     friction: Friction,
-    law: Law,
+    transition: Transition,
     /// The law whose logarithmic friction has the same derivatives at v_f.
     law_f: Law,
-    v_i: f64,
-    v_f: f64,
     k: f64,
     m: f64,
     at_start: SteadySliding,
@@ -36,21 +34,18 @@ struct Row {
 impl Row {
     fn v_crit(&self) -> Option<f64> {
         match self.friction {
-            Friction::Log => critical_velocity(self.law, self.k, self.m),
-            Friction::Regularised => arcsinh::critical_velocity(self.law, self.k, self.m),
+            Friction::Log => critical_velocity(self.transition.law, self.k, self.m),
+            Friction::Regularised => arcsinh::critical_velocity(self.transition.law, self.k, self.m),
         }
     }
 
     fn lyapunov_coefficient(&self) -> Option<f64> {
-        let inertia = self.m * self.v_f * self.v_f;
+        let Transition { law, v_f, .. } = self.transition;
+        let inertia = self.m * v_f * v_f;
         if self.law_eps.is_nan() {
-            return lyapunov_coefficient(self.state, self.law, inertia);
+            return lyapunov_coefficient(self.state, law, inertia);
         }
-        interpolated_lyapunov_coefficient(self.law_eps, self.law, inertia)
-    }
-
-    fn transition(&self) -> Transition {
-        Transition { law: self.law, v_i: self.v_i, v_f: self.v_f }
+        interpolated_lyapunov_coefficient(self.law_eps, law, inertia)
     }
 }
 
@@ -81,11 +76,11 @@ fields! { Row:
     slip_fraction_smooth "1"
         "greatest fraction of the slip law, in a mixture with the ageing law, with smooth optima at the states of v_i and v_f: \
          a/(a + T) with the greater steady friction T; null for T <= 0", optional
-        => |row| number(smooth_slip_fraction(&row.transition()));
+        => |row| number(smooth_slip_fraction(&row.transition));
     law_eps_smooth "1"
         "least law_eps with smooth optima at all v >= 1 and all states from that of the greater velocity to 1; null where \
          friction at v = 1 is there below 0 or b - a", optional
-        => |row| number(smooth_eps(&row.transition()));
+        => |row| number(smooth_eps(&row.transition));
 }
 
 const GROWTH_RATE: usize = place(&COLUMNS, "growth_rate");
@@ -107,7 +102,8 @@ pub static STABILITY: Table = Table {
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
     let with_eigenvalues = job.projection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
     rows::each(job, range, 1024, buffer, FIELDS, |_, point| {
-        let Transition { law, v_i, v_f } = transition(point);
+        let transition = transition(point);
+        let Transition { law, v_i, v_f } = transition;
         let (k, m) = (point[Quantity::Stiffness], point[Quantity::Mass]);
         let friction = job.friction;
         let at = |v: f64| match friction {
@@ -116,23 +112,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         };
         let [at_start, at_end] = [v_i, v_f].map(|v| SteadySliding::new(at(v), k, m, v));
         let eigenvalues = with_eigenvalues.then(|| at_end.eigenvalues()).flatten();
-        (
-            Status::Ok,
-            Some(Row {
-                state: point.state_law(),
-                law_eps: point[Quantity::LawEps],
-                friction,
-                law,
-                law_f: at(v_f),
-                v_i,
-                v_f,
-                k,
-                m,
-                at_start,
-                at_end,
-                eigenvalues,
-            }),
-            RunStats::default(),
-        )
+        let (state, law_eps, law_f) = (point.state_law(), point[Quantity::LawEps], at(v_f));
+        let row = Row { state, law_eps, friction, transition, law_f, k, m, at_start, at_end, eigenvalues };
+        (Status::Ok, Some(row), RunStats::default())
     })
 }
