@@ -9,6 +9,7 @@ use crate::dataset::{
     Cell, CheckDepth, Counts, Folder, MAX_KEPT_ROWS, Manifest, StatisticsRow, Survey, TableStatistics,
 };
 use crate::grid::Quantity;
+use crate::protocol::Status;
 use crate::table::{self, STATUS};
 
 /// Arguments of `summary`.
@@ -117,6 +118,12 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
         }
     }
     blocks.extend(predicted(name, statistics));
+    let has_bound = table::find(name).is_some_and(|table| table.columns().iter().any(|column| column.name == "bound"));
+    let is_written = statistics.columns.iter().any(|(column, _)| column == "bound");
+    if statistics.status[Status::Infeasible as usize] > 0 && has_bound && !is_written {
+        let help = "help: the column `bound` states why a row is infeasible: columns = [..., \"bound\"]";
+        blocks.push(SummaryBlock::Line(2, help.to_owned()));
+    }
     blocks
 }
 

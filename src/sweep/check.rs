@@ -73,11 +73,10 @@ fn path_hint(path: &Path) -> String {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
-    names.retain(|name| name.ends_with(".toml"));
     names.sort();
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    match nearest(&format!("{stem}.toml"), names.iter().map(String::as_str)) {
-        Some(name) => format!("did you mean `{}`?", path.with_file_name(name).display()),
+    match nearest(&stem, names.iter().filter_map(|name| name.strip_suffix(".toml"))) {
+        Some(name) => format!("did you mean `{}`?", path.with_file_name(format!("{name}.toml")).display()),
         None => "check the path".to_owned(),
     }
 }
@@ -96,7 +95,10 @@ impl Sweep {
             io::ErrorKind::InvalidInput => {
                 fault(error.to_string(), "a TOML file", "write the spec to a file, and name that file")
             }
-            _ => fault(format!("cannot read: {error}"), "a readable TOML file", &path_hint(path)),
+            kind => {
+                let help = if kind == io::ErrorKind::NotFound { &path_hint(path) } else { "check its permissions" };
+                fault(format!("cannot read: {error}"), "a readable TOML file", help)
+            }
         })?;
         if bytes.len() as u64 > MAX_SPEC_BYTES {
             let expected = format!("a spec of at most {MAX_SPEC_BYTES} bytes");
@@ -223,9 +225,17 @@ impl Request {
     pub fn needs_optimum(&self, grid: &Grid) -> bool {
         grid.blocks.iter().any(|block| self.table.needs_optimum(&self.projection, block))
     }
+
+    /// Whether it has numbers of an optimum that knows nothing of the axis `quantity`.
+    fn compares_without(&self, quantity: Quantity) -> bool {
+        let mut names = self.projection.indices().iter().map(|&column| self.table.columns()[column].name);
+        let is_of_optimum = |name: &str| name == "work_optimal" || name.starts_with("gap");
+        !self.table.axes().contains(&quantity) && (self.table.name() == "crossover" || names.any(is_of_optimum))
+    }
 }
 
-/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads.
+/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads, and on ceilings of which the optimum of
+/// a table knows nothing.
 fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
     let tables = |request: &Request| [Some(request.table), request.members.as_ref().and_then(|_| table::find("gap"))];
     let tables: Vec<&Table> = requests.iter().flat_map(tables).flatten().collect();
@@ -237,15 +247,25 @@ fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
         let expressions = block.derived.iter().map(|derived| &derived.expression).chain(&block.condition);
         let read: Vec<Quantity> = expressions.flat_map(|expression| expression.reads()).collect();
         for quantity in written.axes.keys().filter_map(|name| Quantity::from_name(name)) {
-            if of_table(quantity) || read.contains(&quantity) || (has_best && quantity.has_scale()) {
-                continue;
-            }
             let others = table::ALL.into_iter().filter(|table| table.axes().contains(&quantity));
-            let others: Vec<&str> = others.map(|table| table.name()).collect();
-            let names: Vec<&str> = tables.iter().map(|table| table.name()).collect();
-            let (key, name) = (format!("{prefix}axes.{}", quantity.name()), names.join(", "));
-            let help = format!("remove it, or add a table that has it: {}", others.join(", "));
-            warnings.push(SpecError::new(key, format!("no effect on {name}"), "an axis of a requested table", help));
+            let others = others.map(|table| table.name()).collect::<Vec<_>>().join(", ");
+            let is_ceiling = matches!(quantity, Quantity::VelocityCeiling | Quantity::FrictionCeiling);
+            let is_used = of_table(quantity) || read.contains(&quantity) || (has_best && quantity.has_scale());
+            let (names, expected, help): (Vec<&str>, _, _) = if !is_used {
+                let help = format!("remove it, or add a table that has it: {others}");
+                (tables.iter().map(|table| table.name()).collect(), "an axis of a requested table".to_owned(), help)
+            } else if is_ceiling && block.may_be(quantity, f64::is_finite) {
+                let free = requests.iter().filter(|request| request.compares_without(quantity));
+                let help = format!("compare their optimum with rows of the others where {} = inf", quantity.name());
+                (free.map(|request| request.table.name()).collect(), format!("tables that have it: {others}"), help)
+            } else {
+                continue;
+            };
+            if !names.is_empty() {
+                let (key, found) =
+                    (format!("{prefix}axes.{}", quantity.name()), format!("no effect on {}", names.join(", ")));
+                warnings.push(SpecError::new(key, found, expected, help));
+            }
         }
     }
     warnings
@@ -439,7 +459,10 @@ fn request(draft: TableDraft, grid: &Grid, prefixes: &[String]) -> Result<Reques
         TooMany::Combinations(block) => too_many(format!("{}where", prefixes[block])),
     })?;
     if let Some(empty) = row_index.blocks().iter().position(|block_rows| block_rows.rows() == 0) {
-        let help = "correct the condition, or the axes in it";
+        let help = block::nan(&grid.blocks[empty])
+            .map_or("correct the condition, or the axes in it".to_owned(), |nan| {
+                format!("correct the expression of {nan}, which meets no condition")
+            });
         let key = format!("{}where", prefixes[empty]);
         return refuse(key, "matches no points", "a condition that some point meets", help);
     }

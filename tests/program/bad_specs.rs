@@ -57,6 +57,10 @@ fn a_spec_that_cannot_be_read() {
         );
         assert_eq!(String::from_utf8_lossy(&output.stderr), message);
     }
+    // Another letter is another name.
+    fs::write(folder.path().join("a.toml"), "").expect("is writable");
+    let output = slipsweep(&["run", "b"], folder.path());
+    assert_eq!(String::from_utf8_lossy(&output.stderr), message.replace("nowhere.toml", "b"));
 }
 
 /// Neither a named pipe nor a device is waited for.
@@ -98,6 +102,16 @@ fn doubtful_axes_and_scales() {
     let used = spec.replace("dt = [0.1, 0.2]\n[tables.crossover]", "[tables.crossover]\n[tables.stability]");
     fs::write(folder.path().join("used.toml"), used).expect("is writable");
     assert!(slipsweep(&["plan", "used.toml"], folder.path()).stderr.is_empty());
+    // A ceiling of the optimum of one table, and not of the others.
+    let spec = "name = \"c\"\n[axes]\nt_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nv_ceiling = [300.0, inf]\n[tables.optimal]\n\
+                [tables.crossover]\n[tables.shortcut]\n[tables.stability]\n";
+    fs::write(folder.path().join("c.toml"), spec).expect("is writable");
+    let warning = "warning: c.toml:8: axes.v_ceiling: no effect on crossover, shortcut\n  expected: tables that have it: gap, best_cubic, optimal, \
+                   feedback\n  help: compare their optimum with rows of the others where v_ceiling = inf\n";
+    assert_eq!(String::from_utf8_lossy(&slipsweep(&["plan", "c.toml"], folder.path()).stderr), warning);
+    let unbound = spec.replace("[300.0, inf]", "inf");
+    fs::write(folder.path().join("unbound.toml"), unbound).expect("is writable");
+    assert!(slipsweep(&["plan", "unbound.toml"], folder.path()).stderr.is_empty());
     let si = "name = \"si\"\n[model]\nunits = \"si\"\nmu_0 = 60\nl = 20\nv_0 = 1e-4\nnormal_stress = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
               v_i = 3.0\nv_f = 10.0\n[tables.crossover]\n";
     fs::write(folder.path().join("si.toml"), si).expect("is writable");

@@ -159,7 +159,7 @@ impl Overlay {
             }
         }
         let has_ceilings = |name: &str| scene.filtered.axis(name).is_some_and(|axis| !axis.values.is_empty());
-        let is_free = self.tables.contains(&"feedback") && CEILINGS.into_iter().any(has_ceilings);
+        let is_free = !CEILINGS.contains(&self.other) && CEILINGS.into_iter().any(has_ceilings);
         for (curve, _) in self.curves.iter().zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
             let condition = if is_free { " without ceilings" } else { curve.1 };
             let text = format!("{}{condition}", label::name(curve.0));
