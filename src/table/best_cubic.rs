@@ -7,7 +7,7 @@ use super::optimum_cache::{LAW_AXES, OPTIMUM_AXES, transition};
 use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, place, rows};
 use crate::grid::{Point, Quantity, Scale};
 use crate::protocol::optimal::Bounds;
-use crate::protocol::{Solved, SolverStats, best_cubic, error};
+use crate::protocol::{SolverStats, best_cubic, error};
 
 /// A row.
 struct Row {
@@ -24,16 +24,17 @@ fields! { Row:
     alpha_3 (Kind::Quantity(Quantity::Alpha3)) "coefficient of t^2 in theta; in the unit of alpha_3 in the spec, 1/t_f^2 by default"
         => |row| row.alpha_3;
     work "mu_0 sigma l" "work of friction W_s of the best shortcut" => |row| row.best.work;
-    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol, under v_ceiling if there is one" => |row| row.best.work_optimal;
+    work_optimal "mu_0 sigma l" "least work of friction W* of any protocol, under v_ceiling if there is one; if none exists, the row is infeasible" => |row| row.best.work_optimal;
     gap "1" "(W_s - W*)/W*, computed without cancellation; relative error up to 1e-7, or absolute error up to 1e-20; error up to 1e-11 (1 + gap) with a law other than ageing, or under a ceiling" => |row| row.best.gap;
     v_min "v_0" "least velocity of the best shortcut" => |row| row.best.v_min;
     work_error "mu_0 sigma l" "error bound of work, by a second search", optional => |row| row.work_error;
+    v_max "v_0" "greatest velocity of the best shortcut, which v_ceiling does not bound", optional => |row| row.best.v_max;
 }
 
 const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
 /// One row for each transition and duration, under the laws of a grid with the axis `law`.
-pub static BEST_CUBIC: Table = Table { axes: LAW_AXES, compute: compute_with_laws, ..BEST_CUBIC_OF_AGEING };
+pub static BEST_CUBIC: Table = Table { axes: LAW_AXES, ..BEST_CUBIC_OF_AGEING };
 
 /// One row for each transition and duration, with ageing and without ceilings.
 pub const BEST_CUBIC_OF_AGEING: Table = Table {
@@ -48,23 +49,11 @@ pub const BEST_CUBIC_OF_AGEING: Table = Table {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let solve = |point: &Point, rtol| best_cubic::solve(&transition(point), point[Quantity::Time], job.bounded, rtol);
-    compute_by(job, range, buffer, solve)
-}
-
-fn compute_with_laws(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    compute_by(job, range, buffer, |point, rtol| {
+    // Without these axes the law is ageing, and the ceiling NaN, which is none.
+    let solve = |point: &Point, rtol| {
         let bounds = Bounds::new(job.bounded).with_v_ceiling(point[Quantity::VelocityCeiling]);
         best_cubic::solve_under(point.state_law(), &transition(point), point[Quantity::Time], bounds, rtol)
-    })
-}
-
-fn compute_by(
-    job: &Job<'_>,
-    range: Range<u64>,
-    buffer: &mut ColumnBuffer,
-    solve: impl Fn(&Point, f64) -> Solved<best_cubic::BestCubic> + Sync,
-) -> Result<RunStats, Stopped> {
+    };
     let natural = |quantity| job.grid.scale(quantity) == Some(Scale::Model);
     let (natural_2, natural_3) = (natural(Quantity::Alpha2), natural(Quantity::Alpha3));
     rows::each(job, range, 1, buffer, FIELDS, |_, point| {

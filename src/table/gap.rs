@@ -27,12 +27,13 @@ pub(super) const COLUMNS: &[Column] = &[
     Column::number(
         "work_optimal",
         "mu_0 sigma l",
-        "least work of friction W* of any protocol, under v_ceiling if there is one",
+        "least work of friction W* of any protocol, under v_ceiling if there is one; if none exists, the row is infeasible",
     ),
     Column::number("gap", "1", "(W_s - W*)/W*; error up to rtol (1 + gap)"),
     Column::number("v_min", "v_0", "least velocity of the shortcut"),
     Column::number("work_error", "mu_0 sigma l", "error bound of work, by a second quadrature").optional(),
     Column::number("gap_error", "1", "error bound of gap, by a second quadrature and a second optimum").optional(),
+    Column::number("v_max", "v_0", "greatest velocity of the shortcut, which v_ceiling does not bound").optional(),
 ];
 
 /// Rows of a chunk. Chosen: a run stops within a fraction of a second at any accuracy.
@@ -50,15 +51,7 @@ pub static GAP: Table = Table {
 pub const GAP_OF_AGEING: Table = Table {
     name: "gap",
     doc: "the work of a cubic shortcut and its gap to the optimum",
-    axes: &[
-        Quantity::Time,
-        Quantity::A,
-        Quantity::B,
-        Quantity::InitialVelocity,
-        Quantity::FinalVelocity,
-        Quantity::Alpha2,
-        Quantity::Alpha3,
-    ],
+    axes: &[Time, A, B, InitialVelocity, FinalVelocity, Alpha2, Alpha3],
     columns: COLUMNS,
     rows_per_part: 1 << 18,
     cost: 100,
@@ -116,6 +109,7 @@ struct LandscapeRows {
     prepared: OnceLock<PreparedLandscape>,
 }
 
+#[derive(Default)]
 struct PreparedLandscape {
     /// `None` if no protocol with `v >= 1` is fast enough: every row is infeasible.
     landscape: Option<Landscape>,
@@ -284,7 +278,7 @@ fn evaluate(
             continue;
         };
 
-        let [work_s, work_optimal, gap, v_min, work_error, gap_error] = now.columns;
+        let [work_s, work_optimal, gap, v_min, work_error, gap_error, v_max] = now.columns;
         let with_work = !gap.is_empty() || prepared.finest.is_some();
         let works = if work_s.is_empty() && with_work { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
@@ -294,11 +288,7 @@ fn evaluate(
             let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
             work += RunStats::from(landscape.regularise(&a_2, &a_3, job.rtol, out));
         }
-        let errors = if work_error.is_empty() && prepared.finest.is_some() {
-            buffer(&mut error_buffer, length)
-        } else {
-            work_error
-        };
+        let errors = if work_error.is_empty() { buffer(&mut error_buffer, length) } else { work_error };
         if let Some((finest, transition, t_f)) = &prepared.finest {
             let mut again = now.status.to_vec();
             let out = LandscapeBuffers { work: &mut *errors, v_min: &mut [], status: &mut again };
@@ -307,26 +297,21 @@ fn evaluate(
                 *error = error::of_shortcut(transition, *t_f, v_min, work_s, *error);
             }
         }
+        landscape.greatest_velocities(&a_2, &a_3, now.status, v_max);
 
-        compare(prepared, Compared { status: now.status, works, v_min, work_optimal, gap, errors, gap_error });
+        compare(prepared, now.status, [works, v_min, work_optimal, gap, gap_error], errors);
     }
     work
 }
 
-/// The cells of a group in a chunk, its work computed; a column that is not requested is empty.
-struct Compared<'a> {
-    status: &'a mut [Status],
-    works: &'a mut [f64],
-    v_min: &'a mut [f64],
-    work_optimal: &'a mut [f64],
-    gap: &'a mut [f64],
-    errors: &'a [f64],
-    gap_error: &'a mut [f64],
-}
-
-/// Removes rows that did not converge, and compares the work with the optimum.
-fn compare(prepared: &PreparedLandscape, cells: Compared<'_>) {
-    let Compared { status, works, v_min, work_optimal, gap, errors, gap_error } = cells;
+/// Removes rows of a group that did not converge, and compares the works of the others, with these errors, with the optimum. A column that is not
+/// requested is empty.
+fn compare(
+    prepared: &PreparedLandscape,
+    status: &mut [Status],
+    [works, v_min, work_optimal, gap, gap_error]: [&mut [f64]; 5],
+    errors: &[f64],
+) {
     for (i, status) in status.iter().enumerate() {
         if *status == Status::NotConverged {
             [works.get_mut(i), v_min.get_mut(i)].into_iter().flatten().for_each(|cell| *cell = f64::NAN);
@@ -359,11 +344,9 @@ fn buffer(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
 }
 
 fn prepare(job: &Job<'_>, group: &LandscapeRows, point: &Point, work: &mut RunStats) -> PreparedLandscape {
-    let (transition, t_f) = (transition(point), point[Quantity::Time]);
-    if job.bounded && t_f < transition.min_duration() {
-        return PreparedLandscape { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
+    if job.bounded && point[Quantity::Time] < transition(point).min_duration() {
+        return PreparedLandscape::default();
     }
-    work.landscapes += 1;
     let mut error_optimal = f64::NAN;
     let optimum = needs_optimum(job.projection).then(|| {
         let solved = cached_optimum(job, (group.tuple, point), work);
@@ -372,28 +355,28 @@ fn prepare(job: &Job<'_>, group: &LandscapeRows, point: &Point, work: &mut RunSt
         }
         (solved.status, solved.value.map(|optimum| optimum.work))
     });
-    let landscape = |rtol| Landscape::new(&transition, t_f, rtol);
-    let finest =
-        job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| (landscape(error::TIGHTEST_RTOL), transition, t_f));
-    PreparedLandscape { landscape: Some(landscape(job.rtol)), finest, optimum, error_optimal }
+    PreparedLandscape { optimum, error_optimal, ..landscapes(job, point, work) }
 }
 
 /// [`prepare`] under the law and the velocity ceiling of the point.
 fn prepare_with_law(job: &Job<'_>, _: &LandscapeRows, point: &Point, work: &mut RunStats) -> PreparedLandscape {
-    let (transition, t_f, state) = (transition(point), point[Quantity::Time], point.state_law());
     let least = least_work(job, point, job.projection.has(GAP_ERROR), work);
     if least.status == Status::Infeasible {
-        return PreparedLandscape { landscape: None, finest: None, optimum: None, error_optimal: f64::NAN };
+        return PreparedLandscape::default();
     }
+    let optimum = Some((least.status, least.value.map(|(work, _)| work)));
+    let error_optimal = least.value.map_or(f64::NAN, |(_, error)| error);
+    PreparedLandscape { optimum, error_optimal, ..landscapes(job, point, work) }
+}
+
+/// The landscapes of a point, not yet compared with an optimum.
+fn landscapes(job: &Job<'_>, point: &Point, work: &mut RunStats) -> PreparedLandscape {
     work.landscapes += 1;
-    let landscape = |rtol| Landscape::under(state, &transition, t_f, rtol);
+    let (transition, t_f) = (transition(point), point[Quantity::Time]);
+    let landscape = |rtol| Landscape::under(point.state_law(), &transition, t_f, rtol);
     let has_errors = job.projection.has_any([WORK_ERROR, GAP_ERROR]);
-    PreparedLandscape {
-        landscape: Some(landscape(job.rtol)),
-        finest: has_errors.then(|| (landscape(error::TIGHTEST_RTOL), transition, t_f)),
-        optimum: Some((least.status, least.value.map(|(work, _)| work))),
-        error_optimal: least.value.map_or(f64::NAN, |(_, error)| error),
-    }
+    let finest = has_errors.then(|| (landscape(error::TIGHTEST_RTOL), transition, t_f));
+    PreparedLandscape { landscape: Some(landscape(job.rtol)), finest, ..PreparedLandscape::default() }
 }
 
 /// Sorts a buffer from the order of computation into the order of rows.

@@ -1,7 +1,7 @@
 //! `best_cubic`: the work at the row's coefficients, integrated over time, and a search for less work around them.
 
 use super::checked_row::NEGATIVE;
-use super::gap::Cubic;
+use super::gap::{Cubic, compare_v_max};
 use super::task::Task;
 use super::{Checked, CheckedRow, relaxed};
 use crate::model::StateLaw;
@@ -36,6 +36,7 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     let noise = fastest * if has_root { HALF_OF_THE_DIGITS } else { 4.0 * f64::EPSILON };
     let noise = noise.max(off[0]).max(off[1]);
     row.compare_relative("v_min", v_min, v_min + noise / rtol);
+    compare_v_max(row, [a_2, a_3], |[a_2, a_3]| at(a_2, a_3));
     if noise < v_min {
         row.compare_friction(cubic.friction_min());
     } else {

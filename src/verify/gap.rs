@@ -5,6 +5,7 @@ use super::route::integrate;
 use super::task::Task;
 use super::{Checked, CheckedRow, arcsinh, relaxed};
 use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::numerics::cubic;
 use crate::protocol::Status;
 
 /// Number of points at which a function is evaluated before its least value is refined. Chosen: many for each extremum of a quotient of cubics.
@@ -28,6 +29,7 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
         return Ok(());
     }
     row.compare("v_min", cubic.v_min());
+    compare_v_max(row, coefficients, |coefficients| Cubic::new(&problem, t_f, coefficients).under(state, friction));
     if friction == Friction::Log {
         row.compare_friction(cubic.friction_min());
     }
@@ -45,6 +47,17 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
         row.compare_gap(least, work);
     }
     Ok(())
+}
+
+/// Compares the greatest velocity, if it is written, with that of the cubic `at` the coefficients, up to their rounding.
+pub fn compare_v_max(row: &mut CheckedRow<'_>, [a_2, a_3]: [f64; 2], at: impl Fn([f64; 2]) -> Cubic) {
+    if row.has_column("v_max") {
+        let nudge = 1.0 + 2.0 * f64::EPSILON;
+        let places = [[a_2, a_3], [a_2 * nudge, a_3], [a_2, a_3 * nudge]];
+        let [v_max, by_2, by_3] = places.map(|place| at(place).v_max());
+        let noise = 4.0 * ((by_2 - v_max).abs() + (by_3 - v_max).abs());
+        row.compare_relative("v_max", v_max, v_max + noise / row.context.rtol);
+    }
 }
 
 /// A cubic shortcut over `x = t/t_f`.
@@ -114,6 +127,13 @@ impl Cubic {
 
     pub fn v_min(&self) -> f64 {
         lowest(&|at| self.velocity(at))
+    }
+
+    /// The inverse of the least `theta/u`, whose only narrow dip is that of theta.
+    fn v_max(&self) -> f64 {
+        let dip = cubic::Cubic { c: self.theta[0] }.minimum();
+        let least = |range| motion::lowest(&|x| 1.0 / self.velocity(place(x)), range, SCAN_POINTS);
+        1.0 / least((0.0, dip)).min(least((dip, 1.0)))
     }
 
     fn friction(&self, at: Place) -> f64 {

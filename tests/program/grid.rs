@@ -588,6 +588,29 @@ fn paper_parameters_in_si_are_the_scaled_ones() {
     assert!((number(&compliant, "v_max") / 4.31e-3 - 1.0).abs() <= 1e-3);
 }
 
+/// The shortcut with continuous velocity is a point of the landscape, at which the family `cubic` has formulas of its own.
+#[test]
+fn the_greatest_velocity_of_a_cubic_shortcut_in_si_is_that_of_its_family() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let si = "[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 20e-6\nv_0 = 1e-8\nnormal_stress = 50e6\n[axes]\nt_f = [20.0, 60.0, 300.0]\na = 0.01\n\
+              b = [0.008, 0.015]\nv_i = [1e-7, 3e-5]\nv_f = [1e-5, 2e-6]\nfamily = \"cubic\"\nalpha_2 = 0.0\n\
+              alpha_3 = { expr = \"3 * 20e-6 * (1 / v_f - 1 / v_i) / t_f ^ 2\" }\nv_ceiling = [2e-5, inf]\n";
+    let tables = "[tables.shortcut]\ncolumns = [\"v_max\"]\n[tables.gap]\ncolumns = [\"v_max\"]\n";
+    run(&load(folder.path(), &si, tables).expect("is legal"), folder.path(), 2);
+    let (family, landscape) = (read(folder.path(), "shortcut"), read(folder.path(), "gap"));
+    let known = numbers(&family, "v_max");
+    let (mut compared, mut faster) = (0, 0);
+    for (row, (found, ceiling)) in
+        numbers(&landscape, "v_max").into_iter().zip(numbers(&landscape, "v_ceiling")).enumerate()
+    {
+        let (Some(found), Some(known), Some(ceiling)) = (found, known[row / 2], ceiling) else { continue };
+        assert!((found / known - 1.0).abs() <= 1e-12, "row {row}: {found} {known}");
+        compared += 1;
+        faster += usize::from(found > ceiling);
+    }
+    assert!(compared > 20 && faster > 3, "{compared} {faster}");
+}
+
 #[test]
 fn odd_values_are_written_as_they_were_requested() {
     let folder = tempfile::tempdir().expect("is writable");

@@ -16,8 +16,9 @@ use slipsweep::sweep::Sweep;
 const AXES: &str = "t_f = [0.02, 0.3, 0.41]\na = 0.03\nb = [0.01, 0.03, 0.05]\nv_i = 3.0\nv_f = [100.0, 2.0]\n\
                     alpha_2 = { linspace = [-0.2, 0.2, 3], unit = \"1/t_f\" }\nalpha_3 = 0.0\ntau_ceiling = 1.6\nk = [0.01, 0.03]\nm = 1e-5\n";
 
-const TABLES: &str =
-    "[tables.gap]\n[tables.best_cubic]\n[tables.optimal]\n[tables.crossover]\n[tables.shortcut]\n[tables.stability]\n";
+const TABLES: &str = "[tables.gap]\ncolumns = [\"work\", \"work_optimal\", \"gap\", \"v_min\", \"v_max\"]\n\
+     [tables.best_cubic]\ncolumns = [\"alpha_2\", \"alpha_3\", \"work\", \"work_optimal\", \"gap\", \"v_min\", \"v_max\"]\n\
+     [tables.optimal]\n[tables.crossover]\n[tables.shortcut]\n[tables.stability]\n";
 
 fn verify(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
@@ -57,13 +58,14 @@ const LAW_AXES: &str = "law = [\"ageing\", \"slip\", \"prz\"]\nt_f = [0.1, 0.4, 
 #[test]
 fn landscapes_of_other_laws_are_verified() {
     let folder = tempfile::tempdir().expect("is writable");
-    run(&sweep(folder.path(), LAW_AXES, "[tables.gap]\n"), folder.path(), 2);
+    let tables = "[tables.gap]\ncolumns = [\"work\", \"work_optimal\", \"gap\", \"v_min\", \"v_max\"]\n";
+    run(&sweep(folder.path(), LAW_AXES, tables), folder.path(), 2);
     let output = verify(folder.path(), &["--sample", "1000"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
     assert!(text(&output).contains("gap: 324 rows"), "{}", text(&output));
-    for column in ["work", "v_min"] {
+    for column in ["work", "v_min", "v_max"] {
         let folder = tempfile::tempdir().expect("is writable");
-        run(&sweep(folder.path(), LAW_AXES, "[tables.gap]\n"), folder.path(), 2);
+        run(&sweep(folder.path(), LAW_AXES, tables), folder.path(), 2);
         corrupt(folder.path(), "gap", column);
         let output = verify(folder.path(), &["--sample", "1000"]);
         assert_ne!(output.status.code(), Some(0), "{column}: {}", text(&output));
@@ -130,8 +132,10 @@ fn a_planted_error_is_found_and_named() {
     for (table, column) in [
         ("gap", "work"),
         ("gap", "v_min"),
+        ("gap", "v_max"),
         ("gap", "work_optimal"),
         ("best_cubic", "work"),
+        ("best_cubic", "v_max"),
         ("optimal", "work"),
         ("optimal", "v_start"),
         ("optimal", "v_end"),

@@ -317,14 +317,15 @@ def rows(law):
         v_min = mpf(1) if any(abs(shortcut.v(mpf(x)) - 1) < 1e-3 for x in active) else shortcut.least(shortcut.v)
         made += 1
         regime = "corner" if len(active) == 2 else "edge"
-        numbers = [a_2, a_3, work, optimum["work"], (work - optimum["work"]) / optimum["work"], v_min]
+        v_max = -shortcut.least(lambda x: -shortcut.v(x))
+        numbers = [a_2, a_3, work, optimum["work"], (work - optimum["work"]) / optimum["work"], v_min, v_max]
         yield [law, regime] + [repr(x) for x in case[:6]] + [nstr(x, 25) for x in numbers]
 
 
 if __name__ == "__main__":
     mp.dps = 30
     print("# made by best_cubic_laws.py, mpmath at 30 digits")
-    print("law,regime,t_f,a,b,v_i,v_f,v_ceiling,a_2,a_3,work,work_optimal,gap,v_min")
+    print("law,regime,t_f,a,b,v_i,v_f,v_ceiling,a_2,a_3,work,work_optimal,gap,v_min,v_max")
     for law in sys.argv[1:] or FASTEST:
         for row in rows(law):
             print(",".join(row), flush=True)

@@ -510,13 +510,14 @@ def landscape_point(a, b, v_i, v_f, t_f, a_2, a_3):
     places = stationary([3 * a_4, 2 * a_3, a_2])
     turns = stationary([6 * a_4, 2 * a_3])
     if min(theta(x) for x in [mpf(0), mpf(1)] + places) <= 0 or min(n(x) for x in [mpf(0), mpf(1)] + turns) <= 0:
-        return None, None, "infeasible"
+        return None, None, None, "infeasible"
     # v' = 0: theta_x^2 - t_f theta_x - theta theta_xx = 0.
     quartic = [3 * a_4**2, 4 * a_3 * a_4, 2 * a_3**2 - 3 * t_f * a_4, 2 * a_2 * a_3 - 2 * t_f * a_3 - 6 * q0 * a_4, a_2**2 - t_f * a_2 - 2 * q0 * a_3]
     while quartic and quartic[0] == 0:
         quartic.pop(0)
     v = lambda x: n(x) / (t_f * theta(x))
-    v_min = min(v(x) for x in [mpf(0), mpf(1)] + stationary(quartic))
+    velocities = [v(x) for x in [mpf(0), mpf(1)] + stationary(quartic)]
+    v_min, v_max = min(velocities), max(velocities)
     f = lambda x: (1 + a * log(n(x) / t_f) + (b - a) * log(theta(x))) * n(x) / theta(x)
     cuts = set([mpf(0), mpf(1)] + places + turns)
     # Zeros near the interval: cut geometrically towards their real parts.
@@ -533,8 +534,8 @@ def landscape_point(a, b, v_i, v_f, t_f, a_2, a_3):
             cuts.add(x)
     work = quad(f, sorted(cuts))
     if friction_min(a, b, t_f, [q0, a_2, a_3, a_4]) < 0:
-        return work, v_min, "negative_friction"
-    return work, v_min, "ok" if v_min >= 1 else "below_bound"
+        return work, v_min, v_max, "negative_friction"
+    return work, v_min, v_max, "ok" if v_min >= 1 else "below_bound"
 
 
 def landscape_rows():
@@ -557,7 +558,7 @@ def landscape_rows():
     border = []
     for case in cases[:90]:
         # Walk from a feasible point towards a far one and stop just inside the border.
-        if landscape_point(*case)[2] == "infeasible":
+        if landscape_point(*case)[-1] == "infeasible":
             continue
         angle = rng.uniform(0, 6.283185307179586)
         far = (float(case[5] + 3 * mp.cos(angle)), float(case[6] + 3 * mp.sin(angle)))
@@ -570,8 +571,8 @@ def landscape_rows():
         for distance in rng.sample([1e-3, 1e-6, 1e-9, 1e-12], 2):
             border.append(at(inside * (1 - mpf(distance))))
     for case in cases + border:
-        work, v_min, status = landscape_point(*case)
-        yield [repr(x) for x in case] + [show(work), show(v_min), status]
+        work, v_min, v_max, status = landscape_point(*case)
+        yield [repr(x) for x in case] + [show(work), show(v_min), status, show(v_max)]
 
 
 def landscape_status(a, b, v_i, v_f, t_f, a_2, a_3):
@@ -661,10 +662,10 @@ def best_rows():
                             raise Unphysical
                     a_2, a_3 = a_2 + fraction * step[0], a_3 + fraction * step[1]
             mp.dps = DIGITS
-            work, v_min, status = landscape_point(*case[:5], a_2, a_3)
+            work, v_min, v_max, status = landscape_point(*case[:5], a_2, a_3)
             if status == "infeasible" or (case[5] and status != "ok"):
                 continue
-            yield [repr(x) for x in case] + [show(x) for x in (a_2, a_3, work, optimum, (work - optimum) / optimum, v_min)]
+            yield [repr(x) for x in case] + [show(x) for x in (a_2, a_3, work, optimum, (work - optimum) / optimum, v_min, v_max)]
         except (Unphysical, AssertionError, TypeError) as error:
             mp.dps = DIGITS
             print("skipped", case, repr(error)[:80], file=sys.stderr)
@@ -706,11 +707,11 @@ def touching_rows():
         near = mp.findroot(lambda *z: conditions(*z), tuple(near), tol=mpf(10) ** -50, maxsteps=30)
         mp.dps = DIGITS
         a_2, a_3 = near[0], near[1]
-        work, v_min, status = landscape_point(a, b, v_i, v_f, time, a_2, a_3)
+        work, v_min, v_max, status = landscape_point(a, b, v_i, v_f, time, a_2, a_3)
         assert abs(v_min - 1) < mpf(10) ** -22, v_min
         optimum = optimal_row(0.03, 0.05, 3.0, 100.0, t_f, True)[0]
         case = (0.03, 0.05, 3.0, 100.0, t_f, 1)
-        yield [repr(x) for x in case] + [show(x) for x in (a_2, a_3, work, optimum, (work - optimum) / optimum)]
+        yield [repr(x) for x in case] + [show(x) for x in (a_2, a_3, work, optimum, (work - optimum) / optimum, v_max)]
 
 
 def edge_rows():
@@ -822,12 +823,12 @@ TABLES = {
     "crossover": (["a", "b", "v_i", "v_f", "t_cross", "t_floor", "t_cheapest", "t_min", "t_turn", "t_free_in", "t_free_out",
                    "work_at_t_cross", "work_at_t_floor", "work_at_t_cheapest", "work_at_t_min", "work_at_t_turn"], crossover_rows),
     "optimal": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], optimal_rows),
-    "landscape": (["a", "b", "v_i", "v_f", "t_f", "a_2", "a_3", "work", "v_min", "status"], landscape_rows),
+    "landscape": (["a", "b", "v_i", "v_f", "t_f", "a_2", "a_3", "work", "v_min", "status", "v_max"], landscape_rows),
     "stability": (["a", "b", "k", "m", "v", "growth_rate", "frequency", "decay_rate"], stability_rows),
     "optimal_edges": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], edge_rows),
-    "best_cubic_touching": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap"], touching_rows),
+    "best_cubic_touching": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_max"], touching_rows),
     "hopf": (["a", "b", "v_i", "v_f", "k", "m", "first_lyapunov_coefficient"], hopf_rows),
-    "best_cubic": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_min"], best_rows),
+    "best_cubic": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_min", "v_max"], best_rows),
 }
 
 if __name__ == "__main__":

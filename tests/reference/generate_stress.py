@@ -70,7 +70,7 @@ def of_gap(p):
     key = [p[name] for name in (*LAW, "t_f", "a_2", "a_3")]
     if not landscape_status(*key):
         return key, [None, None, "infeasible"]
-    work, v_min, status = landscape_point(*key)
+    work, v_min, _, status = landscape_point(*key)
     assert status != "infeasible"
     mp.dps = DIGITS // 2
     rough = landscape_point(*key)[0]

@@ -136,7 +136,7 @@ def rows(law):
         regime = "infeasible" if slack <= 0 else "border" if border else "inside"
         if made[regime] == COUNT[regime] or 0 < slack < mpf(10) ** -14:
             continue
-        numbers = [None] * 4
+        numbers = [None] * 5
         if slack > 0:
             friction = shortcut.least(shortcut.friction)
             if abs(friction) < mpf("1e-6"):
@@ -150,18 +150,18 @@ def rows(law):
                 mp.dps = 40
             if "work" not in optimum:
                 continue
-            numbers = [shortcut.work(), shortcut.least(shortcut.v), optimum["work"], friction]
+            numbers = [shortcut.work(), shortcut.least(shortcut.v), optimum["work"], friction, -shortcut.least(lambda x: -shortcut.v(x))]
         made[regime] += 1
         text = ["" if x is None else nstr(x, 25) for x in numbers]
         v_min, friction = numbers[1], numbers[3]
         status = "infeasible" if slack <= 0 else "negative_friction" if friction < 0 else "below_bound" if v_min < 1 else "ok"
-        yield [law, regime] + [repr(x) for x in case] + text[:3] + [status]
+        yield [law, regime] + [repr(x) for x in case] + text[:3] + [status, text[4]]
 
 
 if __name__ == "__main__":
     mp.dps = 40
     print("# made by landscape_laws.py, mpmath at 40 digits, W* at 30")
-    print("law,regime,t_f,a,b,v_i,v_f,v_ceiling,a_2,a_3,work,v_min,work_optimal,status")
+    print("law,regime,t_f,a,b,v_i,v_f,v_ceiling,a_2,a_3,work,v_min,work_optimal,status,v_max")
     for law in sys.argv[1:] or FASTEST:
         for row in rows(law):
             print(",".join(row), flush=True)

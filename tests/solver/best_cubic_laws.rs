@@ -23,7 +23,7 @@ fn reference_best_shortcuts_of_other_laws() {
         let bounds = Bounds::new(true).with_v_ceiling(row.number("v_ceiling"));
         let solved = solve_under(state, &transition, row.number("t_f"), bounds, 1e-10);
         assert_eq!(solved.status, Status::Ok, "{row:?}");
-        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min } = solved.value.expect("has values");
+        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max } = solved.value.expect("has values");
         let size = a_2.abs() + a_3.abs();
         for (name, found, scale, budget) in [
             ("a_2", a_2, size, 2e-8),
@@ -32,6 +32,7 @@ fn reference_best_shortcuts_of_other_laws() {
             ("work_optimal", work_optimal, work_optimal, 1e-13),
             ("gap", gap, 1.0 + gap, 3e-13),
             ("v_min", v_min, v_min, 2e-8),
+            ("v_max", v_max, v_max, 2e-8),
         ] {
             let error = (found - row.number(name)).abs() / scale;
             assert!(error < budget, "{name} {found} off by {error:.1e} in {row:?}");

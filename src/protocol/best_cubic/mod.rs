@@ -37,6 +37,8 @@ pub struct BestCubic {
     pub gap: f64,
     /// Its least velocity; 1 where it touches the bound.
     pub v_min: f64,
+    /// Its greatest velocity.
+    pub v_max: f64,
 }
 
 /// Gap from which the difference of two works, each good to 1e-12, is good to 1e-8 of itself. Derived from these errors.
@@ -100,8 +102,8 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     let own = if v_min < 1.0 { Status::BelowBound } else { Status::Ok };
     let status = own.with_friction(path.friction_min(law)).compared_with(optimum.status);
     let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
-    let gap = excess / optimum_value.work;
-    let value = BestCubic { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min };
+    let (gap, v_max) = (excess / optimum_value.work, landscape.greatest_velocity(&path));
+    let value = BestCubic { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min, v_max };
     Solved { status, value: Some(value), stats }
 }
 
@@ -175,7 +177,8 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
         v_min = v_min.min(fastest_rise.max(1.0)).max(1.0);
     }
     let status = Status::Ok.with_friction(friction_min).compared_with(optimum.status);
-    Solved { status, value: Some(BestCubic { a_2, a_3, work: least.work, work_optimal, gap, v_min }), stats }
+    let (work, v_max) = (least.work, landscape.greatest_velocity(&path));
+    Solved { status, value: Some(BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max }), stats }
 }
 
 /// Distance of the least velocity from 1 that is rounding where the bound is active. Chosen: far above rounding.

@@ -162,6 +162,15 @@ impl Landscape {
         stats
     }
 
+    /// Writes the greatest velocities of the shortcuts with a work.
+    pub fn greatest_velocities(&self, a_2: &[f64], a_3: &[f64], status: &[Status], v_max: &mut [f64]) {
+        for (i, v_max) in v_max.iter_mut().enumerate() {
+            if !matches!(status[i], Status::Infeasible | Status::NotConverged) {
+                *v_max = self.greatest_velocity(&Path::new(&self.ends, a_2[i], a_3[i]));
+            }
+        }
+    }
+
     /// The work of a feasible shortcut.
     pub(super) fn whole_work(&self, path: &Path, stats: &mut SolverStats) -> f64 {
         stats.quadratures += 1;

@@ -106,6 +106,12 @@ impl Landscape {
         [v_min, self.friction_min(path)]
     }
 
+    /// The greatest velocity of a feasible shortcut.
+    pub(in crate::protocol) fn greatest_velocity(&self, path: &Path) -> f64 {
+        let places = self.minima(path, -1.0, 1.0).into_iter().chain([0.0, 1.0, path.theta.minimum()]);
+        places.map(|x| self.velocity(path, x)).fold(0.0, f64::max)
+    }
+
     /// The velocity at `x`, from values of 32 digits.
     pub(super) fn velocity(&self, path: &Path, x: f64) -> f64 {
         let (theta, n) = path.at(x);
@@ -124,9 +130,10 @@ impl Landscape {
 
     /// The minima of `p ln(theta v) + q ln theta` inside the shortcut, and possibly other points.
     fn minima(&self, path: &Path, p: f64, q: f64) -> Vec<f64> {
-        if self.state == StateLaw::Prz {
-            // p/2 ln n + q ln theta.
-            let exponents = Law { a: 0.5 * p, b: 0.5 * p + q };
+        if self.state != StateLaw::Slip {
+            // Of the power of n.
+            let power = if self.state == StateLaw::Prz { 0.5 * p } else { p };
+            let exponents = Law { a: power, b: power + q };
             let half = |end: f64| path.stationary(exponents, end).into_iter().map(move |d| (end - d).abs());
             return half(0.0).chain(half(1.0)).collect();
         }

@@ -18,7 +18,7 @@ pub const KNOWN: Known = Known {
 };
 
 fn cases() -> Vec<Case> {
-    let columns = ["alpha_2", "alpha_3", "work", "work_optimal", "gap", "v_min", "work_error"];
+    let columns = ["alpha_2", "alpha_3", "work", "work_optimal", "gap", "v_min", "v_max", "work_error"];
     let none = Case::at(AXES.into_iter().zip([0.39, 0.03, 0.05, 100.0, 3.0])).within("infeasible");
     let none = none.nulls(&columns, Route::Formula).word("status", "infeasible", Route::Formula);
     let inside = reference::table("best_cubic").into_iter().map(|row| {
@@ -38,5 +38,5 @@ fn point(row: &Row) -> Case {
     let case = Case { bounded, ..Case::of(row, &AXES) };
     let case = case.number("alpha_2", row.number("a_2"), Route::Reference);
     let case = case.number("alpha_3", row.number("a_3"), Route::Reference);
-    case.reference(row, &["work", "work_optimal", "gap"])
+    case.reference(row, &["work", "work_optimal", "gap", "v_max"])
 }

@@ -49,7 +49,7 @@ fn of_law(row: &Row) -> Case {
     let mut case = shortcut(row).within("slip and prz");
     let law = if row.text("law") == "slip" { "slip" } else { "prz" };
     case.axes.extend([("law", Value::Word(law)), ("v_ceiling", Value::Number(row.number("v_ceiling")))]);
-    let case = case.reference(row, &["work", "v_min"]);
+    let case = case.reference(row, &["work", "v_min", "v_max"]);
     match (row.optional("work"), row.optional("work_optimal")) {
         (Some(work), Some(least)) => case::gap(case, work, least, Route::Reference),
         _ => case,
@@ -61,7 +61,7 @@ fn point(row: &Row, border: bool) -> Option<Case> {
     let case = shortcut(row);
     let late = t_f < min_duration(transition.v_i, transition.v_f);
     if late || row.text("status") == "infeasible" {
-        let numbers = ["work", "work_optimal", "gap", "v_min", "work_error", "gap_error"];
+        let numbers = ["work", "work_optimal", "gap", "v_min", "v_max", "work_error", "gap_error"];
         let case = case.within("infeasible").nulls(&numbers, Route::Reference);
         return Some(case.word("status", "infeasible", Route::Reference));
     }
@@ -75,6 +75,6 @@ fn point(row: &Row, border: bool) -> Option<Case> {
     let friction = of_cubic(&transition, t_f, row.number("a_2"), row.number("a_3"));
     let status = if friction < 0.0 { "negative_friction" } else { status };
     let case = case.within(if border { "near the border" } else { regime });
-    let case = case.reference(row, &["work", "v_min"]).word("status", status, Route::Reference);
+    let case = case.reference(row, &["work", "v_min", "v_max"]).word("status", status, Route::Reference);
     Some(case::gap(case, work, work_optimal, Route::Judge))
 }

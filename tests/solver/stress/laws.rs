@@ -169,8 +169,9 @@ fn every_best_shortcut_of_other_laws_is_the_best_or_states_so() {
         let solved = solve_under(state, transition, t_f, Bounds::new(true).with_v_ceiling(v_ceiling), rtol);
         row.status(solved.status);
         let (Status::Ok, Some(best)) = (solved.status, solved.value) else { return };
-        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min } = best;
-        row.fact("finite", [a_2, a_3, work, work_optimal, gap, v_min].iter().all(|number| number.is_finite()));
+        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max } = best;
+        let numbers = [a_2, a_3, work, work_optimal, gap, v_min, v_max];
+        row.fact("finite", numbers.iter().all(|number| number.is_finite()));
         row.fact("the bound is kept", v_min >= 1.0);
         row.at_most("gap is that of the works", (gap * work_optimal - (work - work_optimal)).abs(), 1e-11 * work);
         let landscape = Landscape::under(state, transition, t_f, 1e-12);
