@@ -27,16 +27,13 @@ const RESTRICTED: [(Quantity, f64, &str); 3] = [
 ///
 /// An unknown word.
 pub fn friction(model: &ModelSpec) -> Result<Friction, SpecError> {
-    Friction::find(&model.friction).map_or_else(
-        || {
-            let names = Friction::ALL.map(Friction::name);
-            let help = nearest(&model.friction, names)
-                .map_or_else(|| "remove the line".to_owned(), |name| format!("did you mean \"{name}\"?"));
-            let found = format!("unknown form of friction {:?}", model.friction);
-            refuse("model.friction", found, "\"log\" or \"regularised\"", help)
-        },
-        Ok,
-    )
+    Friction::find(&model.friction).ok_or_else(|| {
+        let names = Friction::ALL.map(Friction::name);
+        let help = nearest(&model.friction, names)
+            .map_or_else(|| "remove the line".to_owned(), |name| format!("did you mean \"{name}\"?"));
+        let found = format!("unknown form of friction {:?}", model.friction);
+        SpecError::new("model.friction", found, "\"log\" or \"regularised\"", help)
+    })
 }
 
 /// Checks that `table`, at `key` of a spec, and its requested `columns` exist with `friction`, for the axes of `block`.

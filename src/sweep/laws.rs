@@ -14,18 +14,17 @@ use crate::table::Table;
 pub fn check(key: &str, table: &Table, block: &Block, prefix: &str, is_bounded: bool) -> Result<(), SpecError> {
     check_interpolated(key, table, block, prefix)?;
     let Some(axis) = block.axis(Quantity::Law) else { return Ok(()) };
-    let known = table.laws();
-    let laws = || (0..axis.values.len()).filter_map(|step| StateLaw::ALL.get(axis.values.at(step) as usize));
-    if let Some(law) = laws().find(|law| !known.contains(law)) {
-        let known: Vec<String> = known.iter().map(|law| format!("\"{}\"", law.name())).collect();
-        let expected = format!("law = {}", known.join(" or "));
-        let found = format!("`{}` does not support the law \"{}\" of {prefix}axes.law", table.name(), law.name());
-        return refuse(key, found, expected, "remove the table, or move it to a spec of its own");
-    }
-    let Some(law) = laws().find(|law| **law != StateLaw::Ageing).filter(|_| table.laws_need_ceiling()) else {
-        return Ok(());
-    };
+    let mut laws = (0..axis.values.len()).filter_map(|step| StateLaw::ALL.get(axis.values.at(step) as usize));
+    let Some(law) = laws.find(|law| **law != StateLaw::Ageing) else { return Ok(()) };
     let (name, law) = (table.name(), law.name());
+    if !table.axes().contains(&Quantity::Law) {
+        let found = format!("`{name}` does not support the law \"{law}\" of {prefix}axes.law");
+        return refuse(key, found, "law = \"ageing\"", "remove the table, or move it to a spec of its own");
+    }
+    // Without an optimum no law needs bounds.
+    if !table.axes().contains(&Quantity::VelocityCeiling) {
+        return Ok(());
+    }
     if !is_bounded {
         let found = format!("`{name}` has no optimum without a velocity floor for the law \"{law}\"");
         return refuse(

@@ -184,17 +184,14 @@ fn cells_of<'a>(place: &Line<'_>, line: &'a str) -> Result<Vec<Cow<'a, str>>, Sp
         }
         let after = end.map(|end| (&quoted[..end], quoted[end + 1..].trim_start()));
         let Some((cell, after)) = after.filter(|(_, after)| after.is_empty() || after.starts_with(',')) else {
-            return Err(unclosed(place, line.split(',').next().unwrap_or(line).trim_end()));
+            let cell = line.split(',').next().unwrap_or(line).trim_end();
+            let found = format!("{place}: the quote in `{}` is not closed", shown(cell, MAX_NAME_CHARS));
+            return Err(fault(found, "quotes around a whole cell", "close the quote, or remove it"));
         };
         cells.push(cell.replace("\"\"", "\"").trim().to_owned().into());
         rest = after.strip_prefix(',');
     }
     Ok(cells)
-}
-
-fn unclosed(place: &Line<'_>, cell: &str) -> SpecError {
-    let found = format!("{place}: the quote in `{}` is not closed", shown(cell, MAX_NAME_CHARS));
-    fault(found, "quotes around a whole cell", "close the quote, or remove it")
 }
 
 fn unsound(path: &Path, error: &dyn Display) -> SpecError {

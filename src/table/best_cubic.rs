@@ -49,7 +49,7 @@ pub const BEST_CUBIC_OF_AGEING: Table = Table {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    // Without these axes the law is ageing, and the ceiling NaN, which is none.
+    // Without these axes the law is ageing, and the ceiling NaN or infinite, which is none.
     let solve = |point: &Point, rtol| {
         let bounds = Bounds::new(job.bounded).with_v_ceiling(point[Quantity::VelocityCeiling]);
         best_cubic::solve_under(point.state_law(), &transition(point), point[Quantity::Time], bounds, rtol)

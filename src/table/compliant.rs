@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::memo::Memo;
-use super::optimum_cache::{self, Comparison, transition, without_ceilings};
+use super::optimum_cache::{self, Comparison, transition};
 use super::{ColumnBuffer, Job, Projection, RunStats, Stopped, Table, number, place, rows};
 use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Mass, Sampling, Stiffness, Time};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
+use crate::protocol::optimal::Bounds;
 use crate::protocol::{Solved, SpringBlock, error};
 use crate::stability::{OpenLoopResult, amplification, held_error, open_loop_error};
 
@@ -88,8 +89,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut least = Comparison::NONE;
         if needs_optimum(job.projection) {
             let bounded = job.projection.has(GAP_ERROR);
-            let works = (member.work, work_error);
-            least = optimum_cache::compare(job, (tuple, point), &without_ceilings(job), works, bounded, &mut work);
+            let (free, works) = (Bounds::new(job.bounded), (member.work, work_error));
+            least = optimum_cache::compare(job, (tuple, point), &free, works, bounded, &mut work);
             status = status.compared_with(least.optimum);
         }
         let is_held = job.projection.has(SAMPLING_ERROR) && dt > 0.0;

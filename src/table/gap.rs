@@ -7,13 +7,14 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::failpoint;
-use super::optimum_cache::{LAW_AXES, cached_optimum, least_work, transition, without_ceilings, work_error};
+use super::optimum_cache::{LAW_AXES, cached_optimum, least_work, transition, work_error};
 use super::rows::on_all_threads;
 use super::{Column, ColumnBuffer, Job, Projection, RunStats, Stopped, Table};
 use crate::grid::Quantity::{A, Alpha2, Alpha3, B, FinalVelocity, InitialVelocity, Law, Time, VelocityCeiling};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
 use crate::model::{Friction, Transition};
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
+use crate::protocol::optimal::Bounds;
 use crate::protocol::{Status, error};
 
 const WORK_OPTIMAL: usize = 1;
@@ -351,7 +352,7 @@ fn prepare(job: &Job<'_>, group: &LandscapeRows, point: &Point, work: &mut RunSt
     let optimum = needs_optimum(job.projection).then(|| {
         let solved = cached_optimum(job, (group.tuple, point), work);
         if let Some(optimum) = solved.value.filter(|_| job.projection.has(GAP_ERROR)) {
-            error_optimal = work_error(point, &without_ceilings(job), &optimum, work);
+            error_optimal = work_error(point, &Bounds::new(job.bounded), &optimum, work);
         }
         (solved.status, solved.value.map(|optimum| optimum.work))
     });

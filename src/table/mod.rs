@@ -21,7 +21,7 @@ mod step_response;
 use std::ops::Range;
 
 use crate::grid::{Block, Grid, Point, Quantity, RowIndex, Tuples};
-use crate::model::{Friction, StateLaw};
+use crate::model::Friction;
 
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
@@ -56,16 +56,6 @@ impl Table {
     /// The axes of the table, which are its first columns, in the order of [`Quantity::ALL`].
     pub fn axes(&self) -> &'static [Quantity] {
         self.axes
-    }
-
-    /// The evolution laws of the state that it knows.
-    pub fn laws(&self) -> &'static [StateLaw] {
-        if self.axes.contains(&Quantity::Law) { &StateLaw::ALL } else { &[StateLaw::Ageing] }
-    }
-
-    /// Whether a law other than ageing needs a velocity floor and ceiling, and knows no friction ceiling: the optimum is among its columns.
-    pub fn laws_need_ceiling(&self) -> bool {
-        self.axes.contains(&Quantity::Law) && self.axes.contains(&Quantity::VelocityCeiling)
     }
 
     /// The columns after the axes, without `status`.

@@ -142,7 +142,9 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut work = RunStats::default();
         let bounds = with_ceilings(job, point);
         let (solved, slopes) = if wants_slopes {
-            optimum_cache::slopes(job, point, &bounds, &mut work)
+            let (solved, slopes) = optimal::slopes(&transition(point), point[Quantity::Time], bounds, job.rtol);
+            work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
+            (solved, slopes)
         } else {
             (optimum_cache::optimum(job, (tuple, point), &bounds, &mut work), None)
         };

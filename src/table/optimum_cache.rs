@@ -7,7 +7,7 @@ use super::{Job, RunStats};
 use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Time, VelocityCeiling};
 use crate::grid::{Point, Quantity};
 use crate::model::{Friction, Law, StateLaw, Transition};
-use crate::protocol::optimal::{self, Bounds, Optimum, Slopes};
+use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::{Solved, Status, arcsinh, error, relaxed};
 
 /// The axes of the optimal protocol.
@@ -26,22 +26,10 @@ pub fn transition(point: &Point) -> Transition {
     }
 }
 
-/// The bounds of a row without ceilings.
-pub fn without_ceilings(job: &Job<'_>) -> Bounds {
-    Bounds::new(job.bounded)
-}
-
 /// The bounds of a row of a table with the axes `v_ceiling` and `tau_ceiling`.
 pub fn with_ceilings(job: &Job<'_>, point: &Point) -> Bounds {
     let [v_ceiling, tau_ceiling] = [Quantity::VelocityCeiling, Quantity::FrictionCeiling].map(|axis| point[axis]);
     Bounds { floor: job.bounded, v_ceiling, tau_ceiling }
-}
-
-/// The optimal protocol of `point` under `bounds`, and the slopes of its work. Adds the solver statistics to `work`.
-pub fn slopes(job: &Job<'_>, point: &Point, bounds: &Bounds, work: &mut RunStats) -> (Solved<Optimum>, Option<Slopes>) {
-    let (solved, slopes) = optimal::slopes(&transition(point), point[Quantity::Time], bounds, job.rtol);
-    *work += RunStats { own_optima: 1, ..RunStats::from(solved.stats) };
-    (solved, slopes)
 }
 
 /// The optimal protocol of `point` without ceilings, with `v >= 1` if `bounded`.

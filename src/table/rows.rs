@@ -77,9 +77,6 @@ struct Steps {
     values: Vec<f64>,
 }
 
-/// The number of a tuple, and the consecutive rows that have it.
-type Numbered = (u64, Range<u64>);
-
 /// The cells of consecutive rows.
 struct RowChunk<'a> {
     start: u64,
@@ -93,7 +90,7 @@ impl RowChunk<'_> {
         mut self,
         job: &Job<'_>,
         axes: &[Steps],
-        tuples: &[Numbered],
+        tuples: &[(u64, Range<u64>)],
         fields: &[Field<R>],
         row: &impl Fn(u64, &Point) -> ComputedRow<R>,
     ) -> RunStats {

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::memo::Memo;
-use super::optimum_cache::{self, Comparison, transition, without_ceilings};
+use super::optimum_cache::{self, Comparison, transition};
 use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, place, rows};
 use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Time};
 use crate::grid::{Block, Point, Quantity};
+use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::{Case, FAMILIES, Family, Obstacle, Shortcut as Member};
 use crate::protocol::{SolverStats, error};
 
@@ -99,7 +100,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut status = member.status();
         if needs_optimum(job.projection) {
             let bounded = job.projection.has(GAP_ERROR);
-            let free = without_ceilings(job);
+            let free = Bounds::new(job.bounded);
             // The members of the family obey its own friction ceiling, or none.
             let is_capped = family.uses_tau_ceiling;
             let bounds = if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free };
