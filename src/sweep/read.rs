@@ -61,7 +61,7 @@ fn syntax(text: &str, error: &toml::de::Error) -> SpecError {
 }
 
 /// The help for two values of a list without a comma.
-const MISSING_COMMA: &str = "write a comma between two values";
+const MISSING_COMMA: &str = "write a comma between two values, or `]` after the last";
 
 /// The help for a number with a unit.
 const NUMBER_ALONE: &str =

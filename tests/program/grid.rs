@@ -596,7 +596,7 @@ fn the_greatest_velocity_of_a_cubic_shortcut_in_si_is_that_of_its_family() {
               b = [0.008, 0.015]\nv_i = [1e-7, 3e-5]\nv_f = [1e-5, 2e-6]\nfamily = \"cubic\"\nalpha_2 = 0.0\n\
               alpha_3 = { expr = \"3 * 20e-6 * (1 / v_f - 1 / v_i) / t_f ^ 2\" }\nv_ceiling = [2e-5, inf]\n";
     let tables = "[tables.shortcut]\ncolumns = [\"v_max\"]\n[tables.gap]\ncolumns = [\"v_max\"]\n";
-    run(&load(folder.path(), &si, tables).expect("is legal"), folder.path(), 2);
+    run(&load(folder.path(), si, tables).expect("is legal"), folder.path(), 2);
     let (family, landscape) = (read(folder.path(), "shortcut"), read(folder.path(), "gap"));
     let known = numbers(&family, "v_max");
     let (mut compared, mut faster) = (0, 0);
