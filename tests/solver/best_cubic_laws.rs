@@ -32,7 +32,8 @@ fn reference_best_shortcuts_of_other_laws() {
             ("work_optimal", work_optimal, work_optimal, 1e-13),
             ("gap", gap, 1.0 + gap, 3e-13),
             ("v_min", v_min, v_min, 2e-8),
-            ("v_max", v_max, v_max, 2e-8),
+            // Some times the errors of the coefficients.
+            ("v_max", v_max, v_max, 1e-7),
         ] {
             let error = (found - row.number(name)).abs() / scale;
             assert!(error < budget, "{name} {found} off by {error:.1e} in {row:?}");
