@@ -15,11 +15,12 @@ const MAX_PANELS: u32 = 10_000;
 /// The integrals of the functions `f` over `panels` of start and length, and the number of nodes; `None` if `f` is somewhere, or takes too many
 /// panels.
 ///
-/// The first `checked` functions must not change sign: their integrals are good to rounding. Panels are halved towards the start of each.
+/// The first functions, each with a size, must not change sign: their integrals are good to rounding, of themselves or of the size if that is
+/// greater. Panels are halved towards the start of each.
 pub fn integrals<const N: usize>(
     f: impl Fn(f64) -> Option<[f64; N]>,
     mut panels: Vec<(f64, f64)>,
-    checked: usize,
+    sizes: &[f64],
 ) -> Option<([f64; N], u32)> {
     let on_panel = |(from, length): (f64, f64), nodes: usize| {
         let rule = rule(nodes);
@@ -35,8 +36,8 @@ pub fn integrals<const N: usize>(
         let Some(panel) = panels.pop() else { return Some((total, nodes)) };
         let [coarse, fine] = [on_panel(panel, 10)?, on_panel(panel, 20)?];
         nodes += 30;
-        let limit = |i: usize| (COARSE_RTOL * (total[i] + fine[i]).abs()).max(UNDERFLOW);
-        let agrees = (0..checked.min(N)).all(|i| (fine[i] - coarse[i]).abs() <= limit(i));
+        let limit = |i: usize, size: f64| (COARSE_RTOL * (total[i] + fine[i]).abs().max(size)).max(UNDERFLOW);
+        let agrees = (0..N).zip(sizes).all(|(i, &size)| (fine[i] - coarse[i]).abs() <= limit(i, size));
         if agrees {
             total.iter_mut().zip(fine).for_each(|(sum, value)| *sum += value);
         } else {

@@ -186,13 +186,15 @@ impl Task {
         let by_v = |v_ceiling: f64| Task { bounds: Bounds { v_ceiling, ..self.bounds }, ..*self }.is_feasible();
         let by_tau = |tau_ceiling: f64| Task { bounds: Bounds { tau_ceiling, ..self.bounds }, ..*self }.is_feasible();
         type Under<'a> = &'a dyn Fn(f64) -> Option<bool>;
-        let ceilings: [(&str, Under<'_>); 2] = [("v_ceiling_least", &by_v), ("tau_ceiling_least", &by_tau)];
+        // Friction is a sum of terms of size 1.
+        let ceilings: [(&str, f64, Under<'_>); 2] =
+            [("v_ceiling_least", 0.0, &by_v), ("tau_ceiling_least", 1.0, &by_tau)];
         let margin = 10.0 * row.context.rtol;
-        for (column, under) in ceilings {
+        for (column, terms, under) in ceilings {
             under(f64::INFINITY).into_iter().for_each(|exists| row.demand(column, exists));
             let Some(least) = row.number(column) else { continue };
             // Ten `rtol` above a least ceiling a protocol exists, ten below none does.
-            let [below, above] = [-margin, margin].map(|part| under(least + part * least.abs()));
+            let [below, above] = [-margin, margin].map(|part| under(least + part * (terms + least.abs())));
             row.judge(column, below != Some(true) && above != Some(false), "least feasible");
         }
     }

@@ -1,7 +1,8 @@
 //! Traces against the equations of motion, against the work and the costate that they must carry, and against their own
 //! promise that straight lines between few rows are enough.
 
-use crate::support::relative;
+use crate::extent::quick_or_long;
+use crate::support::{Random, relative};
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Friction, Law, StateLaw, Transition};
@@ -126,14 +127,76 @@ fn the_contact_lifetime_obeys_its_equation_and_friction_its_law() {
     }
 }
 
+/// `int tau v dt` along a motion.
+fn work_of(motion: &dyn Motion) -> f64 {
+    let power = |moment: &Moment| moment.friction * moment.v;
+    motion.landmarks().windows(2).map(|pair| integral(motion, pair[0], pair[1], power)).sum()
+}
+
+/// A transition of the physical domain between velocities that may be equal, and its duration.
+fn random_case(random: &mut Random) -> Case {
+    let a = random.between(1e-3, 0.3);
+    let b = [0.0, a, a * random.between(0.05, 20.0)][(3.0 * random.next()) as usize].min(0.5);
+    let v_i = 1.0 + random.between(1e-3, 1e10);
+    let v_f = [v_i, 1.0 + random.between(1e-3, 1e10)][(2.0 * random.next()) as usize];
+    let t_f = (random.between(1e-3, 1e7) / v_i.max(v_f)).min(1e4);
+    case(Transition { law: Law { a, b }, v_i, v_f }, t_f)
+}
+
+/// Optimal protocols for a case: each law, both forms of friction, with and without bounds.
+fn random_protocols(random: &mut Random, case: &Case) -> [Protocol; 6] {
+    let Transition { law, v_i, v_f } = case.transition;
+    let fast = v_i.max(v_f);
+    let steady = [v_i, v_f].map(|v| 1.0 + (law.a - law.b) * v.ln());
+    let tau_ceiling = steady[0].max(steady[1]) + 3.0 * law.a * random.between(1e-7, 1.0);
+    let v_ceiling = fast * (1.0 + random.between(1e-3, 1e3));
+    let optimal = |floor| Protocol::Optimal { bounds: Bounds::new(floor) };
+    let bounds = Bounds::new(random.next() < 0.8).with_tau_ceiling(tau_ceiling);
+    let ceiling = [v_ceiling, f64::INFINITY][(2.0 * random.next()) as usize];
+    [
+        optimal(true),
+        optimal(false),
+        Protocol::Optimal { bounds: bounds.with_v_ceiling(ceiling) },
+        Protocol::OptimalRegularised,
+        Protocol::Relaxed { law: StateLaw::Slip, v_ceiling },
+        Protocol::Relaxed { law: StateLaw::Prz, v_ceiling },
+    ]
+}
+
+#[test]
+fn random_optima_are_traced_with_their_work() {
+    let (mut random, mut traced) = (Random(11), [0; 6]);
+    for _ in 0..quick_or_long(40, 2_000) {
+        let case = random_case(&mut random);
+        let Case { transition, t_f, .. } = case;
+        for (kind, protocol) in random_protocols(&mut random, &case).into_iter().enumerate() {
+            let path = match protocol.path(&case, 1e-10) {
+                Ok(path) if matches!(path.status, Status::Ok | Status::Unproven) => path,
+                Ok(_) => continue,
+                Err(absence) => {
+                    assert!(!absence.is_defect(), "{kind} {case:?}: {absence}");
+                    continue;
+                }
+            };
+            let trace = Trace::of(&*path.motion, &transition, Times::Fewest);
+            assert!(trace.is_some(), "{kind} {case:?}");
+            let end = path.motion.at(1.0);
+            assert!(relative(end.theta, 1.0 / transition.v_f) < 1e-11 && end.t == t_f, "{kind} {case:?} {end:?}");
+            // Pulses stand for chattering, whose work is their limit.
+            if path.parameters.iter().all(|parameter| parameter.name != "chatter_time") {
+                let (found, size) = (work_of(&*path.motion), path.work.abs());
+                assert!((found - path.work).abs() < 1e-9 * size, "{kind} {case:?}: {found} {}", path.work);
+            }
+            traced[kind] += 1;
+        }
+    }
+    assert!(traced.iter().all(|&count| count > 10), "{traced:?}");
+}
+
 #[test]
 fn work_along_the_motion_is_the_work_that_the_solver_states() {
     for (path, transition) in paths() {
-        let motion = &*path.motion;
-        let landmarks = motion.landmarks();
-        let pieces = landmarks.windows(2);
-        let work: f64 =
-            pieces.map(|pair| integral(motion, pair[0], pair[1], |moment| moment.friction * moment.v)).sum();
+        let (motion, work) = (&*path.motion, work_of(&*path.motion));
         assert!(relative(work, path.work) < 1e-9, "{transition:?} {}: {work} {}", motion.duration(), path.work);
     }
 }

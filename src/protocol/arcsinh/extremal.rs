@@ -123,13 +123,13 @@ impl Extremal {
         }
     }
 
-    /// The integrals along the extremal, to rounding; `None` if it does not exist throughout.
-    pub fn sums(&self, stats: &mut SolverStats) -> Option<Sums> {
+    /// The integrals along the extremal, to rounding of those of the `whole` of which it is a part; `None` if it does not exist throughout.
+    pub fn sums(&self, whole: &Sums, stats: &mut SolverStats) -> Option<Sums> {
         let (from, to) = (self.from, self.from + self.length);
         stats.quadratures += 1;
         let panels = if from < 0.0 && to > 0.0 { vec![(from, -from), (0.0, to)] } else { vec![(from, self.length)] };
         // Time, lag and work are positive.
-        let (sums, nodes) = integrals(|x| self.terms(x), panels, 3)?;
+        let (sums, nodes) = integrals(|x| self.terms(x), panels, &[whole.time, whole.lag, whole.work])?;
         stats.nodes += nodes;
         let [time, lag, work, a, b] = sums;
         Some(Sums { time, lag, work, by_law: [a, b] })

@@ -126,7 +126,7 @@ impl Problem {
         let target = if self.rises { t_f - self.least_time() } else { t_f };
         let greater = self.transition.v_i.min(self.transition.v_f);
         let mut value = |q: f64| {
-            let sums = self.member(q).and_then(|member| member.sums(stats));
+            let sums = self.member(q).and_then(|member| member.sums(&Sums::default(), stats));
             sums.map_or(f64::NAN, |sums| ln(self.measure(&sums).max(f64::MIN_POSITIVE) / target))
         };
         // Theta rises by the rate 1 at most.
@@ -144,7 +144,7 @@ impl Problem {
         let width = bracket[1] - bracket[0];
         let q = crossing(value, bracket, values, BRACKET_RTOL * width);
         let member = self.member(q)?;
-        let sums = member.sums(stats)?;
+        let sums = member.sums(&Sums::default(), stats)?;
         let is_found = ln(self.measure(&sums) / target).abs() < MAX_TIME_ERROR;
         is_found.then_some((member, sums))
     }

@@ -1,6 +1,6 @@
 //! An extremal of regularised friction over time.
 
-use super::extremal::Extremal;
+use super::extremal::{Extremal, Sums};
 use crate::model::Friction;
 use crate::protocol::{Moment, Motion, SolverStats};
 
@@ -11,6 +11,8 @@ const INTERVALS: u32 = 32;
 pub(super) struct ExtremalMotion {
     extremal: Extremal,
     t_f: f64,
+    /// Sums of the whole: near a turn and at rest those of an interval have few digits.
+    whole: Sums,
     /// Time at the start of each interval.
     starts: Vec<f64>,
 }
@@ -18,12 +20,13 @@ pub(super) struct ExtremalMotion {
 impl ExtremalMotion {
     /// The motion of duration `t_f`; `None` if the extremal does not exist throughout.
     pub fn new(extremal: Extremal, t_f: f64, stats: &mut SolverStats) -> Option<ExtremalMotion> {
+        let whole = extremal.sums(&Sums::default(), stats)?;
         let mut starts = vec![0.0];
         for interval in 0..INTERVALS - 1 {
-            let time = extremal.part([interval, interval + 1].map(place)).sums(stats)?.time;
+            let time = extremal.part([interval, interval + 1].map(place)).sums(&whole, stats)?.time;
             starts.push(starts[starts.len() - 1] + time);
         }
-        Some(ExtremalMotion { extremal, t_f, starts })
+        Some(ExtremalMotion { extremal, t_f, whole, starts })
     }
 
     /// Time at `s`.
@@ -33,7 +36,7 @@ impl ExtremalMotion {
         if s <= from {
             return self.starts.get(interval as usize).copied();
         }
-        let time = self.extremal.part([from, s]).sums(&mut SolverStats::default())?.time;
+        let time = self.extremal.part([from, s]).sums(&self.whole, &mut SolverStats::default())?.time;
         Some((self.starts.get(interval as usize)? + time).min(self.t_f))
     }
 }

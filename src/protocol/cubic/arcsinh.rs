@@ -59,7 +59,7 @@ impl Landscape {
             for (centre, from) in [(pair[0], 0.0), (pair[1], -half)] {
                 let (theta, n) = path.about(centre);
                 let integrand = |x: f64| Some([self.power(polynomial(&theta, x), polynomial(&n, x))]);
-                let (sum, more) = integrals(integrand, vec![(from, half)], 1)?;
+                let (sum, more) = integrals(integrand, vec![(from, half)], &[0.0])?;
                 (work, nodes) = (work + sum[0], nodes + more);
             }
         }

@@ -98,7 +98,7 @@ impl Ceilings {
 
     /// An arc on one ceiling.
     pub fn arc(&self, kind: ArcKind, theta_hi: f64, length: f64, z_hi: f64, z_lo: f64) -> CeilingArc {
-        let ln_z = ln(z_hi.abs().min(z_lo.abs()));
+        let ln_z = [z_hi, z_lo].map(|z| ln(z.abs()));
         CeilingArc { ceilings: *self, kind, theta_hi, length, z_hi, z_lo, ln_z }
     }
 }
@@ -127,8 +127,8 @@ pub(super) struct CeilingArc {
     pub z_hi: f64,
     /// `ln u` at the end of smaller theta.
     pub z_lo: f64,
-    /// Logarithm of the smaller of their absolute values, which may be too small for a number.
-    pub ln_z: f64,
+    /// Logarithms of their absolute values, which may be too small for a number.
+    pub ln_z: [f64; 2],
 }
 
 /// Nodes of a panel on a ceiling. Derived: with the lengths below, the singularities leave `3^-32`.
@@ -151,6 +151,17 @@ pub(super) struct CeilingSums {
 }
 
 impl CeilingArc {
+    /// Whether `|ln u|` is least at the end of greater theta.
+    fn is_steady_at_high(&self) -> bool {
+        let [high, low] = [self.z_hi, self.z_lo].map(f64::abs);
+        high < low || high == low && self.ln_z[0] <= self.ln_z[1]
+    }
+
+    /// The least `ln |ln u|`.
+    pub fn least_ln_z(&self) -> f64 {
+        self.ln_z[usize::from(!self.is_steady_at_high())]
+    }
+
     /// Whether theta falls along it.
     pub fn falls(&self) -> bool {
         self.z_hi + self.z_lo > 0.0
@@ -235,7 +246,7 @@ impl CeilingArc {
         let lingered = line.lingered;
         if lingered > 0.0 {
             // Steady sliding on the ceiling, at one lifetime, where G/(u - 1) has a limit.
-            let depth = self.end(self.z_hi.abs() <= self.z_lo.abs());
+            let depth = self.end(self.is_steady_at_high());
             let ln_theta = ln_theta_hi - depth.below;
             let slip = lingered * exp(-ln_theta);
             sums.creep -= ln_theta * slip;
@@ -253,10 +264,9 @@ impl CeilingArc {
 
     /// `ln |u - 1|` at the end of greater theta, and its change to the other: the coordinate of a motion.
     pub fn coordinates(&self) -> (f64, f64) {
-        let of = |z: f64| if z.abs() == self.z_hi.abs().min(self.z_lo.abs()) { self.ln_z } else { ln(z.abs()) };
         // ln(e^z - 1) = ln z for small z.
         let beyond = |z: f64| if z.abs() > LINEAR_LN_U { ln(exp_m1(z).abs() / z.abs()) } else { 0.0 };
-        let (high, low) = (of(self.z_hi) + beyond(self.z_hi), of(self.z_lo) + beyond(self.z_lo));
+        let (high, low) = (self.ln_z[0] + beyond(self.z_hi), self.ln_z[1] + beyond(self.z_lo));
         (high, low - high)
     }
 
@@ -284,13 +294,14 @@ impl CeilingArc {
             _ => z,
         };
         let ln_z = if at < ln(LINEAR_LN_U) && !even { at } else { ln(z.abs()) };
+        // Close to u = 1 only the distance from it has digits.
+        let from_z = !even && !self.is_steady_at_high();
+        let above = if from_z { ((z - self.z_lo) / rise).clamp(0.0, self.length) } else { self.length - depth };
         let mut parts = [
             self.ceilings.arc(self.kind, self.theta_hi, depth, self.z_hi, z),
-            self.ceilings.arc(self.kind, self.theta_hi * exp(-depth), self.length - depth, z, self.z_lo),
+            self.ceilings.arc(self.kind, self.theta_hi * exp(-depth), above, z, self.z_lo),
         ];
-        // The end nearer to u = 1 keeps its logarithm.
-        let high_first = self.z_hi.abs() <= self.z_lo.abs();
-        (parts[0].ln_z, parts[1].ln_z) = if high_first { (self.ln_z, ln_z) } else { (ln_z, self.ln_z) };
+        (parts[0].ln_z, parts[1].ln_z) = ([self.ln_z[0], ln_z], [ln_z, self.ln_z[1]]);
         if self.falls() { parts } else { [parts[1], parts[0]] }
     }
 }
@@ -327,11 +338,11 @@ struct CeilingChart {
 
 impl CeilingLine {
     fn of(arc: &CeilingArc) -> CeilingLine {
-        let high_first = arc.z_hi.abs() <= arc.z_lo.abs();
+        let (high_first, ln_z) = (arc.is_steady_at_high(), arc.least_ln_z());
         let slope = arc.rise().abs();
-        let lingered = if arc.ln_z < STEADY_LN_Z && slope > 0.0 {
+        let lingered = if ln_z < STEADY_LN_Z && slope > 0.0 {
             let theta = arc.theta_hi * if high_first { 1.0 } else { exp(-arc.length) };
-            theta / slope * (STEADY_LN_Z - arc.ln_z)
+            theta / slope * (arc.ln_z[usize::from(high_first)].min(STEADY_LN_Z) - ln_z)
         } else {
             0.0
         };
@@ -355,9 +366,10 @@ impl CeilingLine {
         let near = slope.min(1.0);
         let (mut from, mut to, mut start) = (0.0, 0.0, 0.0);
         // An arc that is short compared with its distance from u = 1 has its digits in s alone.
-        if arc.ln_z < ln(0.5 * near) && slope * self.length > PANEL_FAR * least {
+        let ln_z = arc.least_ln_z();
+        if ln_z < STEADY_LN_Z || ln_z < ln(0.5 * near) && slope * self.length > PANEL_FAR * least {
             let greatest = (least + slope * self.length).min(near);
-            (from, to) = (arc.ln_z.max(STEADY_LN_Z), ln(greatest));
+            (from, to) = (ln_z.max(STEADY_LN_Z), ln(greatest).max(STEADY_LN_Z));
             start = (greatest - least) / slope;
         }
         let longest = PANEL_FAR * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
@@ -461,7 +473,7 @@ impl CeilingChart {
 }
 
 /// `ln |z|` below which `theta` and `z/(e^z - 1)` no longer change. Derived: `e^-42` is 6e-19, below the rounding of a double.
-const STEADY_LN_Z: f64 = -42.0;
+pub(super) const STEADY_LN_Z: f64 = -42.0;
 
 /// Logarithm of an integral over a part of it that rounding hides. Derived: `-ln` of the rounding, 37, and a margin of `e^8`.
 const NEGLIGIBLE_LN: f64 = 45.0;

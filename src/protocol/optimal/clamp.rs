@@ -213,6 +213,12 @@ impl Gap {
         let (grown, bend) = if rise == 1.0 { (exp_m1(y), b * y) } else { (exp_m1(rise * y), 0.0) };
         self.value + a * self.u * grown - self.pull * exp_m1(y) - bend
     }
+
+    /// The limit of the value over `u - 1` at `u = 1`, for a value that vanishes there.
+    pub fn limit(&self, arc: &CeilingArc, depth: Depth) -> f64 {
+        let Law { a, b } = arc.ceilings.law;
+        (a - b - self.pull(depth)) / arc.rise()
+    }
 }
 
 /// A clamped extremal after its time at the floor.
@@ -553,7 +559,7 @@ impl Path {
             });
             if let Some(arc) = first {
                 let before = arc.time();
-                (arc.z_hi, arc.ln_z) = (fall.z_tau, ln(slope) + ln_delta);
+                (arc.z_hi, arc.ln_z[0]) = (fall.z_tau, ln(slope) + ln_delta);
                 path.times.1 += arc.time() - before;
             }
         }
@@ -583,7 +589,7 @@ impl Path {
         };
         if let Some(ln_z) = ln_z {
             let mut arc = ceilings.arc(ArcKind::TauCeiling, to.theta, way, ceilings.z_tau, z);
-            arc.ln_z = ln_z;
+            arc.ln_z[1] = ln_z;
             add(arc);
         } else {
             // In time theta rises.

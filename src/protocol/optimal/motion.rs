@@ -2,7 +2,7 @@
 
 use super::ArcKind;
 use super::arc::{Arc, EqualSteps};
-use super::ceiling::{CeilingArc, Ceilings};
+use super::ceiling::{CeilingArc, Ceilings, STEADY_LN_Z};
 use super::clamp::{ClampedPiece, Depth, Gap};
 use super::constrained::{Constrained, Sitting};
 use super::extremal::Problem;
@@ -142,6 +142,11 @@ impl Segment {
                 vec![(first, count(first)), (length - first, count(length - first))]
             }
             Segment::Free(arc) => vec![(length, arc.pieces.count)],
+            Segment::Ceiling(_) if 2.0 * length > MOST_PARTS => {
+                // Steady sliding on the ceiling, between layers.
+                let layer = 0.1 * MOST_PARTS;
+                vec![(layer, count(2.0 * layer)), (length - 2.0 * layer, 1), (layer, count(2.0 * layer))]
+            }
             Segment::Ceiling(_) => vec![(length, count(2.0 * length).max(2))],
             Segment::Sitting(_) => vec![(length, 2)],
         }
@@ -168,7 +173,12 @@ impl TimedCeiling {
         let theta = arc.theta_hi * exp(-depth.below);
         let of_v = arc.kind == ArcKind::VCeiling;
         let friction = if of_v { 1.0 + a * ln(v_ceiling) + b * ln(theta) } else { tau };
-        let pressed = if z == 0.0 { 0.0 } else { self.gap.value(arc, depth) / exp_m1(z) };
+        let pressed = if high.ln_z[1] < STEADY_LN_Z {
+            // Both vanish with z, and their ratio grows from 0 where they begin.
+            self.gap.limit(arc, depth) * -exp_m1((arc.least_ln_z() - high.ln_z[1]).min(0.0))
+        } else {
+            self.gap.value(arc, depth) / exp_m1(z)
+        };
         Moment {
             t,
             v: if of_v { v_ceiling } else { exp(z) / theta },

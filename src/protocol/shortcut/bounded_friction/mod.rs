@@ -265,7 +265,7 @@ fn acceleration_time_at_ceiling(
         let (fallen, z) = if z_i < z_f { (s, z_i + s * (z_f - z_i)) } else { (1.0 - s, z_f + s * (z_i - z_f)) };
         Some([span * exp(-fallen * span) / v_i / exp_m1(z)])
     };
-    let ([time], nodes) = integrals(rate, vec![(0.0, 1.0)], 1)?;
+    let ([time], nodes) = integrals(rate, vec![(0.0, 1.0)], &[0.0])?;
     *stats += SolverStats { quadratures: 1, nodes };
     Some(time)
 }
