@@ -1,5 +1,6 @@
 //! Adaptive Gauss-Legendre quadrature of several functions at once.
 
+use super::MAX_PANELS;
 use super::gauss::rule;
 
 /// Relative difference of the rules with 10 and 20 nodes at which the second has rounding errors only: for an analytic function, its error is of the
@@ -8,9 +9,6 @@ const COARSE_RTOL: f64 = 1e-8;
 
 /// Difference of both rules that is none. Derived: far above the least double, so that rounding near it does not matter.
 const UNDERFLOW: f64 = 1e-280;
-
-/// Panels, at most. Chosen: 0.1 s.
-const MAX_PANELS: u32 = 10_000;
 
 /// The integrals of the functions `f` over `panels` of start and length, and the number of nodes; `None` if `f` is somewhere, or takes too many
 /// panels.

@@ -1,5 +1,6 @@
 //! Cubic polynomials on an interval: the least value, with a certain sign, and the zeros.
 
+use super::MAX_STEPS;
 use super::double_double::DoubleDouble;
 use super::real::Real;
 
@@ -155,9 +156,6 @@ fn refined([c0, c1, c2, c3]: [DoubleDouble; 4], x: f64) -> DoubleDouble {
     }
     x
 }
-
-/// Greatest number of steps. Chosen: more than bisection would need.
-const MAX_STEPS: u32 = 120;
 
 /// The zeros of `c + b x + a x^2`, in the form of [`ExactCubic::zeros`].
 pub fn exact_quadratic_zeros([c, b, a]: [DoubleDouble; 3]) -> [(DoubleDouble, f64); 2] {

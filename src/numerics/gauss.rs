@@ -4,6 +4,9 @@ use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
 
+/// Nodes of a panel that its integrand's singularities leave far away. Chosen: two vectors of eight.
+pub const SHORT_NODES: usize = 16;
+
 /// Nodes of the largest rule. Chosen: twice those of the largest panel of a landscape.
 pub const MAX_NODES: usize = 512;
 

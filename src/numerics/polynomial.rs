@@ -1,4 +1,5 @@
 //! All real roots of a polynomial on an interval, each bracketed between roots of its derivative.
+use super::MAX_STEPS;
 
 /// The value of `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope.
 pub fn value_and_slope(c: &[f64], x: f64) -> (f64, f64) {
@@ -40,6 +41,3 @@ fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
     }
     Some(x)
 }
-
-/// Greatest number of steps. Chosen: more than bisection from 1 down to 1e-16 and some Newton steps need.
-const MAX_STEPS: u32 = 100;

@@ -1,4 +1,5 @@
 //! A bracketed root finder that always terminates: Newton's method inside a shrinking bracket.
+use super::MAX_STEPS;
 
 /// The value and the slope of a function at one point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,9 +20,6 @@ pub struct Root {
     /// Result of the last probe.
     pub probe: Probe,
 }
-
-/// Greatest number of probes. Chosen: Newton's method takes four to eight; a bisection of any bracket of doubles takes fewer than this.
-const MAX_PROBES: u32 = 200;
 
 /// Greatest growth factor of a step towards an unbounded side. Chosen: ten steps reach a billion times farther.
 const MAX_GROWTH: f64 = 8.0;
@@ -71,7 +69,7 @@ pub fn newton_in_pieces<Piece: Copy + PartialEq>(
     let mut last: Option<(Probe, Piece)> = None;
     let mut below = false;
     let mut above = false;
-    for _ in 0..MAX_PROBES {
+    for _ in 0..MAX_STEPS {
         let p = probe(x).filter(|(p, _)| !p.value.is_nan());
         let step = match p {
             Some((p, piece)) => {
@@ -152,7 +150,7 @@ pub fn crossing(
     [mut f0, mut f1]: [f64; 2],
     resolution: f64,
 ) -> f64 {
-    for _ in 0..MAX_PROBES {
+    for _ in 0..MAX_STEPS {
         if f1 == 0.0 || (x1 - x0).abs() <= resolution {
             return x1;
         }

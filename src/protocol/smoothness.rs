@@ -4,6 +4,7 @@
 //! `u G''/G' <= a/(tau + a)`, the optimum is smooth; a concave piece is jumped over, or the velocity chatters (docs/derivations.md).
 
 use crate::model::{Law, Transition};
+use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, ln};
 
 /// Greatest fraction of the slip law, in a mixture with the ageing law, for which the cost is convex at the steady states of `v_i` and `v_f`, at every velocity
@@ -41,9 +42,6 @@ pub fn smooth_eps(transition: &Transition) -> Option<f64> {
     }
     Some(1.0 - s)
 }
-
-/// Steps of Newton's method, at most. Chosen: the values of the physical domain take ten.
-const MAX_STEPS: u32 = 100;
 
 #[cfg(test)]
 mod tests {

@@ -10,6 +10,7 @@
 //! determinant `H = a k - (b - a)(M + a)` decides stability. Small differences are formed in double-double.
 
 use crate::model::Law;
+use crate::numerics::MAX_STEPS;
 use crate::numerics::double_double::DoubleDouble;
 
 /// Steady sliding of a block on a spring at one velocity, with the coefficients of its characteristic equation.
@@ -119,9 +120,6 @@ enum RemainingEigenvalues {
     Complex { growth: f64, frequency: f64 },
     Real { low: f64, high: f64 },
 }
-
-/// Newton steps, at most. Chosen: a double root takes one for each bit.
-const MAX_STEPS: usize = 100;
 
 impl SteadySliding {
     /// `R = -M x` of a real root `x`, the largest `R` or the only one: a root of `R^3 - (M + a) R^2 + c M R - k M^2`.

@@ -11,6 +11,7 @@
 //! `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps fast modes and
 //! resolves slow ones.
 
+use crate::numerics::LEAST;
 use nalgebra::{DMatrix, DVectorView, Matrix3};
 
 use crate::numerics::elementary::exp;
@@ -77,7 +78,7 @@ fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> 
                 h = (to - from) * duration * change.clamp(0.2, 0.8);
             } else {
                 flow = next;
-                if flow.amax() < VANISHED {
+                if flow.amax() < LEAST {
                     return Some(0.0);
                 }
                 h = ((to - from) * duration * change.clamp(0.5, 4.0)).max(if to == 1.0 { h } else { 0.0 });
@@ -113,9 +114,6 @@ const COARSENING: f64 = 10.0;
 /// Factor of an error in one step, at least. Derived: rounding relative to the start of a step is then below the default `rtol` of its end by three
 /// digits.
 const MIN_STEP_FACTOR: f64 = 1e-3;
-
-/// A flow that counts as 0. Chosen: some decades above the least double.
-const VANISHED: f64 = 1e-290;
 
 /// Decay of an error of `ln theta` under a given velocity, `exp(-int dt/theta)`.
 fn decay(path: &CompliantPath, rule: &Radau) -> f64 {

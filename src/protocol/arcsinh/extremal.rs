@@ -6,6 +6,7 @@
 
 use crate::model::Law;
 use crate::model::arcsinh::{LOG_LEVEL, friction_rise, reduction, scaled_friction, steady_level};
+use crate::numerics::LEAST;
 use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
@@ -176,7 +177,7 @@ impl Point {
     /// The velocity; 0 below the normal numbers.
     pub fn velocity(&self) -> f64 {
         let v = exp(self.ln_u) / self.theta;
-        if v < LEAST_VELOCITY { 0.0 } else { v }
+        if v < LEAST { 0.0 } else { v }
     }
 
     /// Friction.
@@ -189,9 +190,6 @@ impl Point {
         law.a * (scaled_friction(self.level) + reduction(self.level).0) / self.theta
     }
 }
-
-/// Velocity, in `v_0`, that counts as rest. Derived: doubles have fewer digits below `2.2e-308`.
-const LEAST_VELOCITY: f64 = 1e-300;
 
 /// `ln u` at the level `steady` of `u = 1`, where `tau/a + f (1 - u) = target` and `deficit` is how far this is below steady friction; below 0 if
 /// theta `rises`.

@@ -12,7 +12,8 @@ use super::{Solved, SolverStats, Status};
 use crate::model::arcsinh::{reduction, scaled_friction, steady_level};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln, ln_1p};
-use crate::numerics::root::crossing;
+use crate::numerics::root::{LAST_STEP_RESIDUAL, crossing};
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_EXPONENT};
 use extremal::{Extremal, Point, Sums};
 
 /// The optimum and the derivatives of its work.
@@ -131,21 +132,22 @@ impl Problem {
         };
         // Theta rises by the rate 1 at most.
         let mut bracket = [0.0, ln_1p(target * greater).sqrt()];
-        let mut values = [if self.ratio > 0.0 { value(0.0) } else { MIN_LN_DURATION }, value(bracket[1])];
+        let mut values = [if self.ratio > 0.0 { value(0.0) } else { -MAX_EXPONENT }, value(bracket[1])];
         let mut step = 0.25;
         while values[0] > 0.0 && step < MAX_STEP {
             bracket = [bracket[0] - step, bracket[0]];
             values = [value(bracket[0]), values[0]];
             step *= 2.0;
         }
-        if !(values[0] <= 0.0 && values[1] >= -TIME_ROUNDING) {
+        if !(values[0] <= 0.0 && values[1] >= -LONG_ROUNDING_RTOL) {
             return None;
         }
         let width = bracket[1] - bracket[0];
         let q = crossing(value, bracket, values, BRACKET_RTOL * width);
         let member = self.member(q)?;
         let sums = member.sums(&Sums::default(), stats)?;
-        let is_found = ln(self.measure(&sums) / target).abs() < MAX_TIME_ERROR;
+        // The correction of the work leaves the square.
+        let is_found = ln(self.measure(&sums) / target).abs() < LAST_STEP_RESIDUAL;
         is_found.then_some((member, sums))
     }
 
@@ -184,18 +186,8 @@ impl Problem {
 /// `-q` above which the start counts by its velocity. Chosen: the turning point is then at `e` times theta, far from the extremal.
 const TURNING_CHART_END: f64 = 1.0;
 
-/// Logarithm of a vanishing duration over `t_f`. Derived: near that of the least double.
-const MIN_LN_DURATION: f64 = -700.0;
-
 /// Greatest step of the search for a bracket. Chosen: `ln u` of the fastest start.
 const MAX_STEP: f64 = 1e3;
 
 /// Width at which the search ends, relative to its bracket. Derived: the work is corrected to first order, and the other numbers change as much.
 const BRACKET_RTOL: f64 = 1e-13;
-
-/// Relative error of the duration at the upper bound of the bracket that counts as rounding. Chosen: above the rounding of a quadrature; the duration
-/// that is found is checked by itself.
-const TIME_ROUNDING: f64 = 1e-12;
-
-/// Greatest relative error of a duration that the correction of the work covers. Derived: it leaves the square, 1e-18.
-const MAX_TIME_ERROR: f64 = 1e-9;

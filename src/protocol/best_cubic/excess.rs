@@ -21,8 +21,6 @@ use crate::protocol::{SolverStats, optimal};
 const INTEGRAL_RTOL: f64 = 1e-10;
 /// Negligible error relative to the work, from the rounding of `v - v~`. Derived: the promised absolute error of the gap.
 const NEGLIGIBLE_ERROR: f64 = 1e-20;
-/// Relative accuracy of the feedback. Chosen: an error in it counts quadratically until it comes near `v - v~` itself.
-const FEEDBACK: f64 = 1e-12;
 /// Nodes of a panel. Chosen: smooth cases need few panels.
 const NODES: usize = 12;
 /// Greatest number of halvings of a panel, which locate the kinks where the feedback leaves the floor. Chosen: 2^-30 is below the promised error.
@@ -97,7 +95,7 @@ impl Excess<'_> {
         let v = at(side.n).max(0.0) / (self.t_f * theta);
         let position = optimal::Position { theta, rest, drop, time_left, margin };
         let Transition { law, v_f, .. } = *self.transition;
-        let best = optimal::feedback(law, v_f, position, self.bounded, FEEDBACK, self.stats)?;
+        let best = optimal::feedback(law, v_f, position, self.bounded, optimal::MOTION_RTOL, self.stats)?;
         let dearer = if best.v > MIN_DENSITY * v {
             best.v * entropy((v - best.v) / best.v)
         } else {

@@ -1,17 +1,13 @@
 //! Newton's method from a point near the minimum, inside the admissible set.
 
 use super::plane::{Coefficients, Plane, moved};
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_STEPS};
 use crate::protocol::SolverStats;
 use crate::protocol::cubic::WorkDerivatives;
 
-/// Greatest number of Newton steps; each is halved as often as needed. Chosen: several times the usual number.
-const MAX_STEPS: u32 = 60;
 /// Gain of the last step, relative to the work, times `a` where that is small: such a step changes velocities by a fraction of
 /// 1e-11, and the next one would change them by the square of that. Derived: the gain is of second order.
 const LAST_STEP_GAIN: f64 = 1e-22;
-/// Apparent gain by rounding of the gradient, relative to the work. Chosen: ten thousand roundings.
-const GAIN_ROUNDING: f64 = 1e-12;
-
 /// A step of Newton's method.
 struct Newton {
     step: [f64; 2],
@@ -53,7 +49,7 @@ pub(super) fn descend(plane: &Plane, a: f64, start: Coefficients, stats: &mut So
         }
         let work = here.work.abs();
         // The gain is within the rounding of the gradient.
-        if sure && decrement <= GAIN_ROUNDING * a.min(1.0) * work && decrement >= 0.25 * before {
+        if sure && decrement <= LONG_ROUNDING_RTOL * a.min(1.0) * work && decrement >= 0.25 * before {
             return Some(place);
         }
         before = decrement;

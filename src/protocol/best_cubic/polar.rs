@@ -25,14 +25,12 @@ const MAX_STEPS: u32 = 100;
 /// Relative distance from the border within which a condition is active. Chosen: far above rounding.
 const ACTIVE: f64 = 1e-9;
 
-/// Accuracy of the works of the first search. Chosen: works a [`ROUGH_STEP`] from a minimum differ by more.
+/// Accuracy of the works of the first search. Chosen: works a [`DIFFERENCE`] from a minimum differ by more.
 pub(super) const ROUGH_RTOL: f64 = 1e-8;
 /// Relative width of a set that double precision resolves. Chosen: the first search then knows its border to 1e-8 at the worst.
 const MIN_WIDTH: f64 = 1e-8;
 /// Distance from the border, relative to that from the centre, at which the first search takes the border. Chosen: far above rounding.
 const INSET: f64 = 1e-10;
-/// Last step of the first search, in radians and fractions. Chosen: as long as a [`DIFFERENCE`].
-const ROUGH_STEP: f64 = DIFFERENCE;
 /// Relative range of the works in a set which [`ROUGH_RTOL`] resolves. Chosen: a thousand times that.
 const MIN_RANGE: f64 = 1e3 * ROUGH_RTOL;
 /// Works this close to the least one after the first search are refined. Chosen: a hundred times the accuracy of that search.
@@ -88,7 +86,7 @@ pub(super) fn least(plane: &Plane, rough: &Landscape, ellipse: &Ellipse, stats: 
     let is_resolved = most - least > MIN_RANGE * least.abs();
     let (first, all) = if is_resolved { (first, all) } else { (polar.clone(), polar.grid(stats)) };
     let starts = local_minima(&all).into_iter();
-    let starts: Vec<Sample> = starts.map(|start| first.refine(start, FIRST_STEP, ROUGH_STEP, stats)).collect();
+    let starts: Vec<Sample> = starts.map(|start| first.refine(start, FIRST_STEP, DIFFERENCE, stats)).collect();
     let close = starts.iter().map(|start| start.work).fold(f64::INFINITY, f64::min);
     let is_close = |start: &&Sample| start.work <= close + CLOSE_WORK * close.abs();
     let found = starts.iter().filter(is_close).map(|&start| polar.settle(start, stats));
@@ -251,7 +249,7 @@ impl<'a> Polar<'a> {
         let mut sample = |angle: f64, fraction: f64| self.samples([(angle, fraction)], stats)[0];
         if start.fraction < 1.0 {
             let start = sample(start.angle, start.fraction);
-            return self.refine(start, 2.0 * ROUGH_STEP, LAST_STEP, stats);
+            return self.refine(start, 2.0 * DIFFERENCE, LAST_STEP, stats);
         }
         let mut found = sample(start.angle, 1.0);
         let is_smooth = (0..MAX_POLISHES).any(|_| {
@@ -266,7 +264,7 @@ impl<'a> Polar<'a> {
         };
         let inwards = self.samples(INWARDS.map(|step| (found.angle, 1.0 - step)), stats);
         if !is_settled || inwards.iter().any(|inner| inner.work < found.work) {
-            found = self.refine(found, 2.0 * ROUGH_STEP, LAST_STEP, stats);
+            found = self.refine(found, 2.0 * DIFFERENCE, LAST_STEP, stats);
         }
         if is_smooth || found.fraction < 1.0 {
             return found;
@@ -278,7 +276,7 @@ impl<'a> Polar<'a> {
     /// The least work on the border near an angle, by golden sections, and whether it lies between the bounds of the search.
     fn on_border(&self, angle: f64, stats: &mut SolverStats) -> (Sample, bool) {
         let mut sample = |angle: f64| self.samples([(angle, 1.0)], stats)[0];
-        let bounds @ (mut low, mut high) = (angle - 2.0 * ROUGH_STEP, angle + 2.0 * ROUGH_STEP);
+        let bounds @ (mut low, mut high) = (angle - 2.0 * DIFFERENCE, angle + 2.0 * DIFFERENCE);
         let inner = |low: f64, high: f64| low + GOLDEN * (high - low);
         let (mut near, mut far) = (sample(inner(high, low)), sample(inner(low, high)));
         let mut outer = [sample(low).work, sample(high).work];

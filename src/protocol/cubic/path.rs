@@ -5,6 +5,7 @@
 
 use super::rules::{MIN_THIRD, NodeThresholds};
 use crate::model::StateLaw;
+use crate::numerics::MAX_STEPS;
 use crate::numerics::cubic::{Cubic, ExactCubic, exact_quadratic_zeros};
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::Status;
@@ -286,6 +287,3 @@ impl<'a> Path<'a> {
 /// Least n at an end of a panel for sums without logarithms, as a fraction of its coefficients. Measured: below it the rounding of `n'/n` is
 /// visible (`tests/solver/stress/landscape.rs`).
 const MIN_END_FRACTION: f64 = 1e-4;
-
-/// Greatest number of steps of Dinkelbach's method. Chosen: each step doubles the digits.
-pub(super) const MAX_STEPS: u32 = 60;

@@ -4,10 +4,11 @@
 //! a line. Then the ends of a shortcut and the coefficients in Bernstein's form decide most shortcuts; stationary points are computed only for
 //! undecided lanes. A result never depends on neighbouring shortcuts; only the time does.
 
+use crate::numerics::{HUGE, MAX_STEPS};
 use multiversion::multiversion;
 
 use super::friction::FrictionBounds;
-use super::path::{Ends, MAX_STEPS, Path};
+use super::path::{Ends, Path};
 use super::{PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
@@ -116,7 +117,7 @@ fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [
     let mut found = [None; BATCH_SPANS];
     for (i, found) in found.iter_mut().enumerate() {
         let j = i + BATCH_SPANS;
-        let tame = (a_2[i].abs() + a_3[i].abs() < MAX_COORDINATE) & (a_2[j].abs() + a_3[j].abs() < MAX_COORDINATE);
+        let tame = (a_2[i].abs() + a_3[i].abs() < HUGE) & (a_2[j].abs() + a_3[j].abs() < HUGE);
         let [n, theta, surplus] = [0, 1, 2].map(|k| positive[k][i] & positive[k][j]);
         let [no_n, no_theta, no_surplus] = [0, 1, 2].map(|k| negative[k][i] | negative[k][j]);
         let sound = high[0][i] & high[0][j] & high[1][i] & high[1][j];
@@ -178,7 +179,8 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Option<[Lanes; 3]> {
     for i in 0..LANES {
         let (quadratic, doubt) = polynomial(ends, a_2[i], a_3[i], 0);
         let sign = sign_of_quadratic(&quadratic, doubt);
-        let tame = a_2[i].abs() + a_3[i].abs() < MAX_COORDINATE;
+        // No greater coefficients are feasible: `n >= 0` has the mean `t_f - rise`, so its ends are at most nine times that.
+        let tame = a_2[i].abs() + a_3[i].abs() < HUGE;
         n[i] = if tame { sign } else { -1.0 };
     }
     if n.iter().all(|&n| n < 0.0) {
@@ -452,7 +454,3 @@ fn is_lossy(cubic: &Cubic, slack: f64, x: f64, loss: f64) -> bool {
     let sound = loss * cubic.at(x) > 4.0 * f64::EPSILON * (c0.abs() + c1.abs() + c2.abs() + c3.abs()) + slack;
     !sound
 }
-
-/// Coordinates above which no shortcut is feasible. Derived: the quadratic `n >= 0` has the mean `t_f - rise`, so its ends are at most nine
-/// times that. Squares do not overflow below it.
-const MAX_COORDINATE: f64 = 1e100;

@@ -10,11 +10,12 @@
 //! - the **direct chart** `y = ln(theta/theta_a)` is for arcs that stay a factor of two below their turning point, or
 //!   have none.
 
+use crate::numerics::HUGE;
 use multiversion::multiversion;
 
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, polynomial, rough_ln};
-use crate::numerics::gauss::{Rule, rule};
+use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
 
@@ -333,7 +334,7 @@ struct Line {
 impl Line {
     /// The number of pieces with few nodes.
     fn pieces(&self) -> u32 {
-        self.cut(PIECE_NODES as f64, MAX_PIECES, PIECE_TOLERANCE).0
+        self.cut(SHORT_NODES as f64, MAX_PIECES, PIECE_TOLERANCE).0
     }
 
     /// Into how many equal panels, up to `most_panels`, to cut so that none needs more than `most` nodes, and how many
@@ -438,9 +439,6 @@ impl ArcPoint {
     }
 }
 
-/// Nodes of a piece. Chosen: two vectors of lanes.
-const PIECE_NODES: usize = 2 * LANES;
-
 /// Most pieces of an arc. Chosen: a limit on the work; doubling ends there.
 const MAX_PIECES: u32 = 1024;
 
@@ -472,7 +470,7 @@ impl EqualSteps {
     /// The sums of the arc from one place to another of the same piece.
     pub fn sums(&self, from: f64, to: f64) -> Sums {
         let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
-        self.slice.sums::<false>(middle, half, rule(PIECE_NODES))
+        self.slice.sums::<false>(middle, half, rule(SHORT_NODES))
     }
 
     /// The point at `place`.
@@ -550,7 +548,7 @@ fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
     for _ in 0..ROUNDS {
         let (force, side) = ((friction_a - bend * r).max(0.0), shift + bend * s);
         let size = (force * force + side * side).sqrt();
-        r = rough_ln((inverse * size).clamp(LEAST, MOST));
+        r = rough_ln((inverse * size).clamp(1.0 / HUGE, HUGE));
         // Shafer's bound of the arcus tangens from below.
         s = if side > 0.0 { FRAC_PI_2 + 3.0 * force / (side + 2.0 * size) } else { PI };
     }
@@ -559,10 +557,6 @@ fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
 
 /// Rounds of [`zero_above`] and [`last_zero`]. Chosen: the number of nodes needs one digit of the distance.
 const ROUNDS: u32 = 2;
-
-/// Range of what a logarithm is taken of. Chosen: its square neither underflows nor overflows.
-const LEAST: f64 = 1e-100;
-const MOST: f64 = 1e100;
 
 /// A bound from above of the zero of `a E` below the arc in the direct chart, which reaches down to `low`; `slope` is `b
 /// - a`.

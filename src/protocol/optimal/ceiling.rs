@@ -3,13 +3,14 @@
 //! Both ceilings bound `z = ln u`: at `theta = theta_1 e^y` the velocity allows `z_v + y` and friction `z_tau + kappa y`,
 //! `kappa = 1 - b/a` (docs/derivations.md, "Ceilings").
 
+use crate::numerics::NEGLIGIBLE_LN;
 use multiversion::multiversion;
 
 use super::clamp::{Depth, Gap};
 use super::{ArcKind, Bounds};
 use crate::model::{Law, friction_margin};
 use crate::numerics::elementary::{exp, exp_and_m1, exp_m1, ln, ln_1p};
-use crate::numerics::gauss::{Rule, rule};
+use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, fold};
 
 /// The ceilings of a problem that ends in steady sliding.
@@ -130,9 +131,6 @@ pub(super) struct CeilingArc {
     /// Logarithms of their absolute values, which may be too small for a number.
     pub ln_z: [f64; 2],
 }
-
-/// Nodes of a panel on a ceiling. Derived: with the lengths below, the singularities leave `3^-32`.
-const NODES: usize = 16;
 
 /// Integrals over time along an arc on a ceiling.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -367,17 +365,17 @@ impl CeilingLine {
         let (mut from, mut to, mut start) = (0.0, 0.0, 0.0);
         // An arc that is short compared with its distance from u = 1 has its digits in s alone.
         let ln_z = arc.least_ln_z();
-        if ln_z < STEADY_LN_Z || ln_z < ln(0.5 * near) && slope * self.length > PANEL_FAR * least {
+        if ln_z < STEADY_LN_Z || ln_z < ln(0.5 * near) && slope * self.length > PANEL * least {
             let greatest = (least + slope * self.length).min(near);
             (from, to) = (ln_z.max(STEADY_LN_Z), ln(greatest).max(STEADY_LN_Z));
             start = (greatest - least) / slope;
         }
-        let longest = PANEL_FAR * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
+        let longest = PANEL * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
         // What is this much farther from u = 1 takes no time, where theta falls on the way there.
         let falls = self.high_first && self.sign > 0.0;
         let end = if falls { self.length.min(start + NEGLIGIBLE_LN / slope) } else { self.length };
         [
-            CeilingChart { near: true, from, to, longest: PANEL_NEAR },
+            CeilingChart { near: true, from, to, longest: PANEL },
             CeilingChart { near: false, from: start, to: end.max(start), longest },
         ]
     }
@@ -406,7 +404,7 @@ impl CeilingLine {
                         *sum += half * panel;
                     }
                 }
-                nodes += NODES as u32;
+                nodes += SHORT_NODES as u32;
             });
         }
         (sums, nodes)
@@ -423,17 +421,17 @@ fn ceiling_sums(
     line: &CeilingLine,
     near: bool,
     [middle, half]: [f64; 2],
-    x: &[f64; NODES],
-    w: &[f64; NODES],
+    x: &[f64; SHORT_NODES],
+    w: &[f64; SHORT_NODES],
 ) -> [f64; 3] {
-    let (mut depth, mut size, mut scale) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-    for i in 0..NODES {
+    let (mut depth, mut size, mut scale) = ([0.0; SHORT_NODES], [0.0; SHORT_NODES], [0.0; SHORT_NODES]);
+    for i in 0..SHORT_NODES {
         let (s, at, stretch) = line.place(near, middle + half * x[i]);
         depth[i] = if line.high_first { s } else { line.length - s };
         (size[i], scale[i]) = (at, stretch);
     }
     let (mut times, mut depths, mut slips) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    for first in (0..NODES).step_by(LANES) {
+    for first in (0..SHORT_NODES).step_by(LANES) {
         let sums = times.iter_mut().zip(&mut depths).zip(&mut slips);
         for (lane, ((times, depths), slips)) in sums.enumerate() {
             let i = first + lane;
@@ -456,7 +454,7 @@ impl CeilingChart {
         }
         let count = ((self.to - self.from).abs() / self.longest).ceil().max(1.0);
         let half = 0.5 * (self.to - self.from) / count;
-        let rule = rule(NODES);
+        let rule = rule(SHORT_NODES);
         for i in 0..count as u32 {
             panel(self.from + half * f64::from(2 * i + 1), half, rule);
         }
@@ -475,11 +473,5 @@ impl CeilingChart {
 /// `ln |z|` below which `theta` and `z/(e^z - 1)` no longer change. Derived: `e^-42` is 6e-19, below the rounding of a double.
 pub(super) const STEADY_LN_Z: f64 = -42.0;
 
-/// Logarithm of an integral over a part of it that rounding hides. Derived: `-ln` of the rounding, 37, and a margin of `e^8`.
-const NEGLIGIBLE_LN: f64 = 45.0;
-
-/// Longest panel in `ln |z|`. Derived: the singularities at `ln 2 pi + pi i/2` leave `4^-32`.
-const PANEL_NEAR: f64 = 3.0;
-
 /// Longest panel in `ln theta`, in units of the distance from `u = 1` and of the change of `z` by 1. Derived: `3^-32` is left.
-const PANEL_FAR: f64 = 3.0;
+const PANEL: f64 = 3.0;

@@ -3,6 +3,7 @@
 //! Where theta falls the optimum is `z = ln u = min(z_free, z_cap)`. It is on a ceiling where `G = a [phi(z_cap) - E]` is
 //! negative, so the pieces end at the zeros of `G`, which has one stationary point at most, and where the ceilings cross.
 
+use crate::numerics::MAX_STEPS;
 use std::cell::Cell;
 
 use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
@@ -134,9 +135,6 @@ impl Fall {
         d
     }
 }
-
-/// Greatest number of steps. Chosen: more than bisection of a double takes, 64.
-const MAX_STEPS: u32 = 100;
 
 /// Relative rounding error of a depth. Derived: that of one operation.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;

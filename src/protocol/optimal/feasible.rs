@@ -6,6 +6,7 @@ use super::extremal::Problem;
 use super::{ArcKind, Bounds, Obstacle, posed};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, ln};
+use crate::numerics::{LEAST, MAX_EXPONENT};
 
 /// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
 /// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
@@ -110,16 +111,16 @@ fn root(
 ) -> f64 {
     // Above 0 where the ceiling allows `t_f`.
     let room = |place: f64| match feasible(problem, &at(place).1) {
-        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(MIN_TIME, MAX_TIME) / t_f),
-        Feasible::Times(_, most) => ln(most.clamp(MIN_TIME, MAX_TIME) / t_f),
-        Feasible::Sitting(_) => ln(MAX_TIME),
-        Feasible::Never(_) => ln(MIN_TIME),
+        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(LEAST, 1.0 / LEAST) / t_f),
+        Feasible::Times(_, most) => ln(most.clamp(LEAST, 1.0 / LEAST) / t_f),
+        Feasible::Sitting(_) => ln(1.0 / LEAST),
+        Feasible::Never(_) => ln(LEAST),
     };
     let mut low = (start, room(start));
     let mut high = low;
     let first = step;
     while high.1 < 0.0 {
-        if high.0 > MAX_PLACE {
+        if high.0 > MAX_EXPONENT {
             return at(high.0).0;
         }
         low = high;
@@ -128,7 +129,7 @@ fn root(
     }
     step = first;
     while low.1 >= 0.0 {
-        if low.0 < -MAX_PLACE {
+        if low.0 < -MAX_EXPONENT {
             return at(low.0).0;
         }
         high = low;
@@ -165,10 +166,3 @@ fn zero_of_rising(f: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f
     }
     high.0
 }
-
-/// Least and greatest time whose logarithm is taken. Derived: doubles without overflow.
-const MIN_TIME: f64 = 1e-300;
-const MAX_TIME: f64 = 1e300;
-
-/// Greatest place that is searched. Derived: `exp` of it is a number.
-const MAX_PLACE: f64 = 600.0;

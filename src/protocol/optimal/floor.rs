@@ -6,7 +6,7 @@ use super::lifetime::Lifetime;
 use crate::model::Law;
 use crate::numerics::dilogarithm::dilogarithm;
 use crate::numerics::elementary::{exp_m1, ln_1p};
-use crate::numerics::gauss::{Rule, rule};
+use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, fold};
 
 /// Time to age by `growth`, until `rest` is left to 1.
@@ -22,16 +22,13 @@ pub(super) fn work(law: &Law, from: Lifetime, time: f64) -> f64 {
     // ln theta(t) has its singularity at t = ln(1 - theta_0) < 0: as long as the floor arc is no longer than that is away,
     // few nodes do. Beyond, theta has about doubled and a difference of dilogarithms does not cancel.
     let integral = if time <= -ln_1p(-from.theta) {
-        time * from.ln + ln_growth_integral(from.rest / from.theta, time, rule(NODES))
+        time * from.ln + ln_growth_integral(from.rest / from.theta, time, rule(SHORT_NODES))
     } else {
         let to = from.aged(time);
         if from.theta >= 0.5 { dilogarithm(to.rest) - dilogarithm(from.rest) } else { aged(to) - aged(from) }
     };
     time + law.b * integral
 }
-
-/// Nodes of a floor arc on which theta at most doubles. Chosen: the nearest singularity leaves 1e-17 of the integral.
-const NODES: usize = 2 * LANES;
 
 /// `int ln(theta/theta_0) dt`, of `theta/theta_0 = 1 + ratio (1 - e^{-t})`.
 #[multiversion(targets(

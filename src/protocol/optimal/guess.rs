@@ -1,5 +1,6 @@
 //! A first parameter for the search.
 
+use crate::numerics::MAX_EXPONENT;
 use multiversion::multiversion;
 
 use super::arc::phi;
@@ -7,7 +8,7 @@ use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
-use crate::numerics::gauss::rule;
+use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};
 
@@ -55,21 +56,18 @@ pub(super) fn capped_guess(
         let left = 1.0 - i as f64 / LANES as f64;
         *z = most - (most - free) * (left * left);
     }
-    arcs.start(&z, times, &ceilings_at(ceilings, &arcs, rule(CAPPED_NODES).x.first_chunk()?))
+    arcs.start(&z, times, &ceilings_at(ceilings, &arcs, rule(SHORT_NODES).x.first_chunk()?))
 }
 
 /// `u - 1` at the ceilings at the nodes.
-fn ceilings_at(ceilings: &Ceilings, arcs: &Falling, x: &[f64; CAPPED_NODES]) -> [f64; CAPPED_NODES] {
-    let mut caps = [0.0; CAPPED_NODES];
+fn ceilings_at(ceilings: &Ceilings, arcs: &Falling, x: &[f64; SHORT_NODES]) -> [f64; SHORT_NODES] {
+    let mut caps = [0.0; SHORT_NODES];
     for (cap, x) in caps.iter_mut().zip(x) {
         let s = 0.5 * (1.0 + x);
-        *cap = exp_m1(ceilings.cap(arcs.depth * (1.0 - s * s * s)).min(MOST));
+        *cap = exp_m1(ceilings.cap(arcs.depth * (1.0 - s * s * s)).min(MAX_EXPONENT));
     }
     caps
 }
-
-/// Nodes under ceilings: an arc has a kink where one begins. Chosen: two vectors of lanes.
-const CAPPED_NODES: usize = 2 * LANES;
 
 /// Usual error of the line. Measured: it decides only the tolerance of the first quadrature (`cargo bench --bench optimal`).
 const LINE_ERROR: f64 = 0.1;
@@ -130,9 +128,6 @@ const LOWER: f64 = 2.7;
 /// Least of them. Chosen: the time has a pole at 0.
 const LEAST: f64 = 0.02;
 
-/// Logarithm of times so long that the arc does not exist. Derived: doubles overflow at 709.
-const MOST: f64 = 700.0;
-
 /// Eight values of `ln u(0+)` about `near`.
 fn between(near: f64) -> Lanes {
     let first = (near - LOWER).max(LEAST);
@@ -167,11 +162,11 @@ impl Falling {
             }
             sum += over / under;
         }
-        (times[from] < MOST).then_some(sum)
+        (times[from] < MAX_EXPONENT).then_some(sum)
     }
 }
 
-/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MOST`] where there is no arc. Under
+/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MAX_EXPONENT`] where there is no arc. Under
 /// ceilings, of the times beyond that on the ceilings.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",

@@ -262,8 +262,8 @@ pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64)
     (solved, solved.value.map(|_| Route::new(&problem, t_f, member.map(|(extremal, _)| extremal))))
 }
 
-/// Accuracy of every motion: the time on the arc is what is left of `t_f` after the floor arc. Chosen: a hundredth of the default `rtol`.
-const MOTION_RTOL: f64 = 1e-12;
+/// Accuracy of every motion and of the feedback along one: the time on the arc is what is left of `t_f` after the floor arc. Chosen: a hundredth of the default `rtol`.
+pub(super) const MOTION_RTOL: f64 = 1e-12;
 
 /// The least time in which there is a protocol with `v >= 1`, or `v > 0` without the bound; 0 for an acceleration.
 pub fn shortest_time(transition: &Transition, bounded: bool) -> Option<f64> {

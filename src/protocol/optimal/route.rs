@@ -5,6 +5,7 @@ use super::extremal::{Extremal, Problem};
 use super::floor;
 use super::motion::{Floor, Timed};
 use crate::model::Law;
+use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::radau;
 use crate::protocol::control::{Jet, Tolerance, ValueRange};
@@ -298,9 +299,6 @@ fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
 
 /// A relative difference after which one more step is enough. Derived: a step squares it.
 const LAST_STEP_RTOL: f64 = 1e-8;
-
-/// Most steps. Chosen: more than bisection needs.
-const MAX_STEPS: u32 = 60;
 
 #[cfg(test)]
 mod tests {

@@ -6,6 +6,7 @@ use super::clamp::PathView;
 use super::extremal::{Extremal, MAX_LN_U, Problem};
 use super::guess::Guess;
 use super::{ArcKind, Optimum, Strategy, floor};
+use crate::numerics::ROUNDING_RTOL;
 use crate::numerics::elementary::exp;
 use crate::numerics::root::{Probe, newton_in_pieces};
 use crate::protocol::{Solved, SolverStats, Status};
@@ -24,9 +25,6 @@ const MAX_REFINEMENTS: u32 = 10;
 
 /// A relative change of a short floor arc after which the next one is rounding. Derived: the next one is its square.
 const LAST_REFINEMENT_RTOL: f64 = 1e-7;
-
-/// A relative difference of times that is rounding. Chosen: that of a few operations.
-const TIME_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Fraction of the whole time below which a floor arc is short. Derived: as a difference of times, a longer one loses at most two digits.
 const SHORT_FLOOR_TIME: f64 = 0.01;
@@ -213,7 +211,7 @@ impl<'a, F: Family> Search<'a, F> {
             let after = family.short_arc(finer, &next).map_or(before.time, |arc| arc.time);
             // An arc that such a step changes is not yet known to the square of that change.
             let settled =
-                (after - before.time).abs() <= LAST_REFINEMENT_RTOL * before.time || last.value.abs() <= TIME_ROUNDING;
+                (after - before.time).abs() <= LAST_REFINEMENT_RTOL * before.time || last.value.abs() <= ROUNDING_RTOL;
             if family.piece(finer, &next) == piece && last.value.abs() <= self.accuracy.enough && settled && !crosses {
                 break;
             }

@@ -17,9 +17,10 @@
 //! with `theta_b = 1 - (1 - theta_0) e^-t` for `floor = 1` and `theta_0 + t` for 0; all terms are positive. Both are
 //! integrated backwards from `t_f`, until `e^-R` is negligible.
 
+use crate::numerics::{MAX_EXPONENT, MAX_PANELS};
 use multiversion::multiversion;
 
-use super::curve::{CurvePanel, MAX_PANELS, VelocityCurve, x_and_z_at_nodes};
+use super::curve::{CurvePanel, VelocityCurve, x_and_z_at_nodes};
 use super::{Exponent, panel_variation};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
@@ -160,7 +161,7 @@ impl<E: Exponent> ArrivalProblem<E> {
             while d != range.to {
                 let panel = curve.panel(&range, d, panel_variation);
                 let panel = curve.limit_slip(panel, sums.v, curve.last(&panel), panel_variation);
-                let sound = panel.to != d && !panel.to.is_nan() && sums.slip <= MAX_SLIP;
+                let sound = panel.to != d && !panel.to.is_nan() && sums.slip <= MAX_EXPONENT;
                 if !sound || count == MAX_PANELS {
                     return None;
                 }
@@ -228,9 +229,6 @@ const MIN_THETA_FRACTION: f64 = 1e-6;
 
 /// Bound of the remaining integral that ends the integration, in units of the tolerance. Chosen: a thousandth of it does not count among the other errors.
 const NEGLIGIBLE_REST: f64 = 1e-3;
-
-/// Remaining slip, at most. Derived: `theta(t_f) >= e^-R/v_i` is above 1e-308.
-const MAX_SLIP: f64 = 700.0;
 
 /// Sum over the nodes, in one fixed order.
 #[inline(always)]

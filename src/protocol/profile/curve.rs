@@ -4,6 +4,7 @@
 //! rounding of `x`.
 
 use super::Exponent;
+use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau};
 
@@ -37,13 +38,6 @@ pub struct CurvePanel {
     pub from: f64,
     pub to: f64,
 }
-
-/// Fall of `ln(v - floor)` below the higher end (or 0) at which `v - floor` is negligible. Derived: `e^-45` is below the
-/// rounding of 1.
-const NEGLIGIBLE_LEVEL: f64 = 45.0;
-
-/// Panels of one integration, at most. Chosen: the hardest cases take some hundreds.
-pub const MAX_PANELS: u32 = 10_000;
 
 impl<E: Exponent> VelocityCurve<E> {
     /// Velocity that ends at `floor + w_f` after a time `t_f`.
@@ -93,7 +87,7 @@ impl<E: Exponent> VelocityCurve<E> {
 
     /// Ranges of panels in the order of time: first those measured from the start, then those from the end.
     pub fn panel_ranges(&self) -> PanelRanges {
-        self.exponent.panel_ranges(self.ln_w_f, self.reference_level() - NEGLIGIBLE_LEVEL)
+        self.exponent.panel_ranges(self.ln_w_f, self.reference_level() - NEGLIGIBLE_LN)
     }
 
     /// `ln(v - floor)`.
@@ -112,8 +106,8 @@ impl<E: Exponent> VelocityCurve<E> {
         let CurvePanel { side, to, .. } = *range;
         let (x, z) = x_and_z(side, d);
         let e = self.level(x, z) - self.reference_level();
-        if e < -NEGLIGIBLE_LEVEL + 1.0
-            && self.level_at(side, to) - self.reference_level() < -NEGLIGIBLE_LEVEL + 1.0
+        if e < -NEGLIGIBLE_LN + 1.0
+            && self.level_at(side, to) - self.reference_level() < -NEGLIGIBLE_LN + 1.0
             && self.exponent.has_minimum()
         {
             return CurvePanel { side, from: d, to };

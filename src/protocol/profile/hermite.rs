@@ -6,6 +6,7 @@
 
 use super::Exponent;
 use super::curve::{CurvePanel, PanelRanges, ProtocolEnd};
+use crate::numerics::MAX_STEPS;
 
 /// The Hermite exponent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,9 +28,6 @@ const BUMP: [f64; 6] = [0.0, 0.0, 1.0, -3.0, 3.0, -1.0];
 
 /// Coefficients of `S` in powers of `xi`, from the first on; `S(1 - xi) = 1 - S(xi)`.
 const STEP: [f64; 6] = [0.0, 0.0, 10.0, -15.0, 6.0, 0.0];
-
-/// Newton steps on a convex polynomial of degree six, at most. Chosen: it converges from one side.
-const MAX_STEPS: u32 = 100;
 
 /// The stretched variable `xi` and its derivatives in `x`.
 struct Stretched {

@@ -4,11 +4,12 @@
 //! terms. Where the slip is large, theta follows `1/v` and does not depend on its start: Radau collocation gives
 //! `theta'` at the nodes.
 
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_PANELS};
 use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
 use super::arrival::total;
-use super::curve::{CurvePanel, MAX_PANELS, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
+use super::curve::{CurvePanel, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
 use super::{Exponent, panel_variation};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
@@ -105,11 +106,8 @@ pub fn integrate_theta<E: Exponent>(
             d = panel.to;
         }
     }
-    ((theta / theta_1 - 1.0).abs() <= 10.0 * rtol + ROUNDING).then_some(())
+    ((theta / theta_1 - 1.0).abs() <= 10.0 * rtol + LONG_ROUNDING_RTOL).then_some(())
 }
-
-/// Relative rounding error of theta at the end, at most. Chosen: as much as the error allowed at the tightest `rtol`, 1e-13.
-const ROUNDING: f64 = 1e-12;
 
 /// Relative change of `v` in the relaxation time of theta: the relative distance of theta from `1/v` on the slow solution.
 fn lag<E: Exponent>(curve: &VelocityCurve<E>, side: ProtocolEnd, d: f64, v: f64) -> f64 {

@@ -10,9 +10,6 @@ use crate::protocol::{Moment, Motion};
 /// Pulses on the ceiling that stand for chattering. Chosen: they cost 1e-4 more work in the case of docs/laws.md.
 pub const PULSES: usize = 16;
 
-/// Change of `ln theta` and length of an interval between landmarks. Chosen: a polynomial of degree 16 follows it to rounding.
-const INTERVAL: f64 = 1.0;
-
 /// A piece of the motion.
 #[derive(Debug, Clone, Copy)]
 enum Piece {
@@ -48,7 +45,7 @@ impl BangBang {
             }
             Path::Rise(rise) => {
                 let length = problem.from.below_floor - rise.end();
-                motion.pieces.push((Piece::Rise(*rise), 0.0, (length / INTERVAL) as u32 + 1));
+                motion.pieces.push((Piece::Rise(*rise), 0.0, length as u32 + 1));
                 let (v, time) = (exp(rise.end()), rise.wait(problem));
                 let from = State::steady(v, problem.ceiling);
                 motion.push(&BoundArc { kind: Kind::Wait, length: time, ends: [from, problem.to], span: 0.0 });
@@ -62,7 +59,8 @@ impl BangBang {
         let &BoundArc { length, ends: [from, to], .. } = arc;
         if length > 0.0 {
             let change = (from.below_floor - to.below_floor).abs();
-            let intervals = (((length + change) / INTERVAL) as u32).min(MAX_INTERVALS) + 1;
+            // A polynomial of degree 16 follows it to rounding.
+            let intervals = ((length + change) as u32).min(MAX_INTERVALS) + 1;
             self.pieces.push((Piece::Bound(*arc), self.end(), intervals));
         }
     }

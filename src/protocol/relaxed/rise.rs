@@ -4,11 +4,12 @@
 //! `ln theta = -1 - omega - s`, `dt = -(y/(c + y)) ds/v`. The time is in closed form, and the arc ends where `v = 1`; then `v = 1`
 //! (docs/derivations.md).
 
+use crate::numerics::ROUNDING_RTOL;
 use std::f64::consts::E;
 
 use super::{Chatter, Problem, Relaxed};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
-use crate::numerics::gauss::rule;
+use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, crossing, newton};
 use crate::numerics::wright::wright_omega;
 use crate::protocol::SolverStats;
@@ -70,9 +71,6 @@ fn fastest_time(problem: &Problem) -> f64 {
     -exp_m1(1.0 - from) - ln(to)
 }
 
-/// Gauss nodes of a panel.
-const NODES: usize = 16;
-
 /// Greatest length of a panel in `ln v`: the poles at `y = -c` are `pi` off the axis for `c > 0`, so that the error is `3.4^-32`.
 const MAX_PANEL: f64 = 4.0;
 
@@ -81,9 +79,6 @@ const MAX_STEEPNESS: f64 = 1e9;
 
 /// Limit of minus the derivative of the logarithm of the excess with respect to `ln h`: the excess falls like `h^-2` (docs/derivations.md).
 const GREATEST_SLOPE: f64 = 2.0;
-
-/// Distance, relative to a duration, that its rounding hides. Chosen: four roundings.
-const HIDDEN: f64 = 4.0 * f64::EPSILON;
 
 /// Integrals along an arc of `T/(1 + omega)` over `ln theta`, and of `ln v` and `ln theta` over the slip.
 type Sums = [f64; 3];
@@ -103,7 +98,7 @@ impl Rise {
         let steepest = ln(MAX_STEEPNESS * problem.from.v / least);
         let level = if spare <= of_level(steepest).excess_of_whole(problem)[0] {
             steepest
-        } else if slowest - spare <= HIDDEN * t_f {
+        } else if slowest - spare <= ROUNDING_RTOL * t_f {
             0.0
         } else {
             let probe = |level: f64| {
@@ -116,7 +111,7 @@ impl Rise {
             let cube = ((from - 1.0) / from).powi(3);
             let bend = 0.5 * cube * at_start / ((1.0 - problem.weakening()) * slowest);
             let start = 0.25 * (fall + (fall * (fall + 16.0 / bend)).sqrt());
-            let enough = LAST_STEP_RESIDUAL.max(HIDDEN * t_f / spare);
+            let enough = LAST_STEP_RESIDUAL.max(ROUNDING_RTOL * t_f / spare);
             newton(probe, start, (0.0, steepest), true, enough)?.x
         };
         Some(of_level(level))
@@ -246,7 +241,7 @@ impl Rise {
 
     /// The sums along the arc.
     fn sums(&self, problem: &Problem, stats: &mut SolverStats) -> Sums {
-        let (rule, c, h) = (rule(NODES), problem.weakening(), self.h);
+        let (rule, c, h) = (rule(SHORT_NODES), problem.weakening(), self.h);
         let length = self.fall_of_ln_v(problem);
         let (mut sums, mut left) = ([0.0; 3], length);
         // h/v at the end, where the difference in `ln_v` would lose digits.
@@ -265,7 +260,7 @@ impl Rise {
                 sums[1] += weight * ln_v;
                 sums[2] -= weight * (1.0 + omega + ln_v);
             }
-            stats.nodes += NODES as u32;
+            stats.nodes += SHORT_NODES as u32;
             left = if panel == left { 0.0 } else { left - panel };
         }
         stats.quadratures += 1;

@@ -6,7 +6,7 @@ use super::state::State;
 use super::{Path, Problem};
 use crate::model::StateLaw;
 use crate::numerics::elementary::ln_1p;
-use crate::numerics::gauss::rule;
+use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::protocol::optimal::Slopes;
 
 /// Derivatives of the least work of `path`, whose Hamiltonian is `hamiltonian`. Infinite or NaN where they do not exist.
@@ -51,20 +51,17 @@ fn by_ceiling(arc: &BoundArc, turn: usize, problem: &Problem, hamiltonian: f64) 
 }
 
 /// Slip up to which an arc is short, and its derivative a quadrature, since the terms of the closed form cancel. Derived: the distance of theta from the
-/// steady state of the ceiling changes by a factor of e at most, and the error of [`NODES`] is `4.1^-32`.
+/// steady state of the ceiling changes by a factor of e at most, and the error of [`SHORT_NODES`] is `4.1^-32`.
 const SHORT_SLIP: f64 = 1.0;
 
 /// Change of theta, relative to its lesser end, up to which an arc is short. Chosen: beyond, the closed form loses two digits at most.
 const SHORT_SPAN: f64 = 0.5;
 
-/// Gauss nodes of a short arc.
-const NODES: usize = 16;
-
 impl Problem {
     /// [`by_ceiling`] of a short arc: the integral over time of `tau + a + costate dtheta'/dv`.
     fn over_short_arc(&self, arc: &BoundArc, hamiltonian: f64) -> f64 {
         let Problem { law, a, b, ceiling, ln_ceiling, .. } = *self;
-        let (rule, from, steady) = (rule(NODES), &arc.ends[0], hamiltonian / ceiling);
+        let (rule, from, steady) = (rule(SHORT_NODES), &arc.ends[0], hamiltonian / ceiling);
         let span = if from.excess > 0.0 { -arc.span } else { arc.span };
         let terms = rule.x.iter().zip(&rule.w).map(|(x, weight)| {
             let change = 0.5 * span * (1.0 + x);

@@ -12,6 +12,7 @@
 //!
 //! `c_i` the nodes of Radau IIA. It is implicit, so relaxation of theta in a few cycles does not limit its length.
 
+use crate::numerics::MAX_STEPS;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::integration::STAGES as S;
@@ -90,9 +91,6 @@ const COARSENING: f64 = 1e3;
 
 /// Attempts of an envelope step, at most. Chosen: each is a quarter to a fifth as long as the last.
 const MAX_TRIES: u32 = 3;
-
-/// Envelope steps of a response, at most. Chosen: each grows by a factor of up to four; more decide no response.
-const MAX_ENVELOPE_STEPS: u32 = 200;
 
 /// Change of `q` in an envelope step, at most. Chosen: its Jacobian is that at the start.
 const MAX_ENVELOPE_CHANGE: f64 = 2.0;
@@ -207,7 +205,7 @@ impl Follower<'_> {
         let tolerance = self.map_tolerance(range, change);
         let mut map_step = self.map_step(section_point, tolerance)?;
         let (mut time, mut cycles) = (0.0, 0.0);
-        for _ in 0..MAX_ENVELOPE_STEPS {
+        for _ in 0..MAX_STEPS {
             let speed = map_step.distance(map_step.change);
             let tolerance = self.map_tolerance(map_step.range, speed);
             if tolerance < 0.3 * map_step.tolerance {

@@ -33,6 +33,7 @@ use crate::model::{Transition, friction_margin};
 use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln_1p, ln_near_1};
 use crate::numerics::root::{Probe, newton};
+use crate::numerics::{HUGE, MAX_STEPS};
 use crate::protocol::{Motion, SolverStats};
 use motion::BoundedFrictionMotion;
 use panel::FrictionPanel;
@@ -79,9 +80,6 @@ fn motion(case: &Case, rtol: f64) -> Result<Box<dyn Motion>, Obstacle> {
     Ok(Box::new(BoundedFrictionMotion { path, panels }))
 }
 
-/// Margin without a bound, in `mu_0 sigma`: stands for infinity. Chosen: far above every friction, and its square is a double.
-const UNBOUNDED_MARGIN: f64 = 1e100;
-
 /// Spare time, fraction of [`FrictionPath::time_per_w`], below which it is the residual. Chosen; the budgets of `shortcut` judge it.
 const SPARE_TIME_FRACTION: f64 = 0.1;
 
@@ -111,7 +109,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
         return Err(Obstacle::Domain);
     }
     let unbounded = case.tau_ceiling == f64::INFINITY;
-    let distance = |v: f64| if unbounded { UNBOUNDED_MARGIN } else { friction_margin(law, case.tau_ceiling, v) };
+    let distance = |v: f64| if unbounded { HUGE } else { friction_margin(law, case.tau_ceiling, v) };
     let (margin_i, margin_f) = (distance(v_i), distance(v_f));
     if margin_i <= 0.0 || margin_f <= 0.0 {
         return Err(Obstacle::FrictionAtEnds { friction: case.tau_ceiling - margin_i.min(margin_f) });
@@ -168,10 +166,6 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     Err(Obstacle::NotConverged)
 }
 
-/// Passes after the first search, at most. Chosen: Newton's method needs two or three, and a dozen more where theta has
-/// almost relaxed at the end.
-const MAX_PASSES: u32 = 40;
-
 /// Relative change of some velocity in the last step, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_LAST_CHANGE: f64 = 1e-3;
 
@@ -204,7 +198,7 @@ fn refine(
     stats: &mut SolverStats,
 ) -> Option<(FrictionPath, Vec<FrictionPanel>)> {
     let (mut is_last, mut before, mut tolerance, mut expected) = (false, f64::INFINITY, 0.1 * rtol, 0.0);
-    for _ in 0..MAX_PASSES {
+    for _ in 0..MAX_STEPS {
         let (end, panels) = if is_last {
             last_pass(&path, (rtol, tolerance, 0.5 * expected), stats)
         } else {

@@ -11,6 +11,7 @@
 
 use super::panel::{FrictionPanel, collocate};
 use crate::model::Transition;
+use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
 use crate::protocol::SolverStats;
@@ -122,9 +123,6 @@ const NEGLIGIBLE_LN_V: f64 = 100.0;
 
 /// `-ln v` above which the velocity is 0 in double precision. Derived: `e^-746` underflows.
 const UNDERFLOW_LN_V: f64 = 800.0;
-
-/// Where `ln[(tau_M - tau)/margin]` is below this, friction is `tau_M` to the last bit.
-const SATURATION_EXPONENT: f64 = -45.0;
 
 /// Exponent of `tau_M - tau`, at most: it stays within the range of a double. Chosen: `e^400` is 5e173.
 pub(super) const MAX_EXPONENT: f64 = 400.0;
@@ -378,7 +376,7 @@ impl FrictionPath {
     fn friction_minimum(&self) -> Option<(PathEnd, f64)> {
         let position = |side: PathEnd| (side, 0.5 + 0.5 * self.end_state(side).l / self.alpha);
         let positions = [position(PathEnd::Start), position(PathEnd::End)].into_iter();
-        let mut positions = positions.filter(|(_, d)| self.alpha > 0.0 && (0.0..=MIDPOINT).contains(d));
+        let mut positions = positions.filter(|(_, d)| self.alpha > 0.0 && (0.0..=0.5).contains(d));
         positions.next().map(|(side, d)| (side, 0.97 * d))
     }
 
@@ -566,8 +564,8 @@ impl FrictionPath {
         let all = [
             (PathEnd::Start, 0.0, start.0, false),
             (PathEnd::Start, start.0, start.1, self.alpha > 0.0),
-            (PathEnd::Start, start.1, MIDPOINT, false),
-            (PathEnd::End, MIDPOINT, end.1, false),
+            (PathEnd::Start, start.1, 0.5, false),
+            (PathEnd::End, 0.5, end.1, false),
             (PathEnd::End, end.1, end.0, self.alpha > 0.0),
             (PathEnd::End, end.0, 0.0, false),
         ];
@@ -583,16 +581,16 @@ impl FrictionPath {
     /// Distances from an end between which the velocity vanishes or friction saturates.
     fn negligible_range(&self, side: PathEnd) -> (f64, f64) {
         let end_state = self.end_state(side);
-        let level = if self.alpha > 0.0 { end_state.negligible_exponent } else { SATURATION_EXPONENT };
+        let level = if self.alpha > 0.0 { end_state.negligible_exponent } else { -NEGLIGIBLE_LN };
         // The roots of near (l + alpha (1 - near)) = level, written without cancellation.
         let slope = end_state.l + self.alpha;
         let square = slope * slope - 4.0 * self.alpha * level;
         if square <= 0.0 || slope * level <= 0.0 {
-            return (MIDPOINT, MIDPOINT);
+            return (0.5, 0.5);
         }
         let sum = slope + slope.signum() * square.sqrt();
         let (d, far) = (2.0 * level / sum, 0.5 * (sum / self.alpha).abs());
-        (d.min(MIDPOINT), far.min(MIDPOINT))
+        (d.min(0.5), far.min(0.5))
     }
 
     /// Length of a panel at an end, from the exponent and the rate of theta.
@@ -602,9 +600,6 @@ impl FrictionPath {
         (2.0 / (layer + self.t_f * end_state.v + 1.0)).min(1.0)
     }
 }
-
-/// Distance of the middle from either end. By definition.
-const MIDPOINT: f64 = 0.5;
 
 /// Relative change of velocity that theta does not resolve, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_UNRESOLVED_CHANGE: f64 = 0.01;
