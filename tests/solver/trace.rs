@@ -127,10 +127,18 @@ fn the_contact_lifetime_obeys_its_equation_and_friction_its_law() {
     }
 }
 
-/// `int tau v dt` along a motion.
-fn work_of(motion: &dyn Motion) -> f64 {
-    let power = |moment: &Moment| moment.friction * moment.v;
-    motion.landmarks().windows(2).map(|pair| integral(motion, pair[0], pair[1], power)).sum()
+/// `int tau v dt` along a motion, to 1e-11 of `size` in every interval: one that takes more is halved up to six times.
+fn work_of(motion: &dyn Motion, size: f64) -> f64 {
+    fn between(motion: &dyn Motion, [from, to]: [f64; 2], error: f64, splits: u32) -> f64 {
+        let power = |moment: &Moment| moment.friction * moment.v;
+        let halves = [[from, 0.5 * (from + to)], [0.5 * (from + to), to]];
+        let work: f64 = halves.map(|[from, to]| integral(motion, from, to, power)).into_iter().sum();
+        if splits == 0 || (work - integral(motion, from, to, power)).abs() <= error {
+            return work;
+        }
+        halves.map(|half| between(motion, half, error, splits - 1)).into_iter().sum()
+    }
+    motion.landmarks().windows(2).map(|pair| between(motion, [pair[0], pair[1]], 1e-11 * size.abs(), 6)).sum()
 }
 
 /// A transition of the physical domain between velocities that may be equal, and its duration.
@@ -166,7 +174,7 @@ fn random_protocols(random: &mut Random, case: &Case) -> [Protocol; 6] {
 #[test]
 fn random_optima_are_traced_with_their_work() {
     let (mut random, mut traced) = (Random(11), [0; 6]);
-    for _ in 0..quick_or_long(40, 2_000) {
+    for _ in 0..quick_or_long(25, 2_000) {
         let case = random_case(&mut random);
         let Case { transition, t_f, .. } = case;
         for (kind, protocol) in random_protocols(&mut random, &case).into_iter().enumerate() {
@@ -182,21 +190,25 @@ fn random_optima_are_traced_with_their_work() {
             assert!(trace.is_some(), "{kind} {case:?}");
             let end = path.motion.at(1.0);
             assert!(relative(end.theta, 1.0 / transition.v_f) < 1e-11 && end.t == t_f, "{kind} {case:?} {end:?}");
-            // Pulses stand for chattering, whose work is their limit.
-            if path.parameters.iter().all(|parameter| parameter.name != "chatter_time") {
-                let (found, size) = (work_of(&*path.motion), path.work.abs());
-                assert!((found - path.work).abs() < 1e-9 * size, "{kind} {case:?}: {found} {}", path.work);
+            // The rule of the integral takes no jumps inside, which the other laws have.
+            if !matches!(protocol, Protocol::Relaxed { .. }) {
+                let (motion, work) = (&*path.motion, path.work);
+                let powers = motion.landmarks().into_iter().map(|s| motion.at(s)).map(|at| (at.friction * at.v).abs());
+                // Times of a motion are good to 1e-12 of the duration.
+                let noise = 1e-12 * t_f * powers.fold(0.0, f64::max);
+                let found = work_of(motion, work);
+                assert!((found - work).abs() < 1e-9 * work.abs() + noise, "{kind} {case:?}: {found} {work}");
             }
             traced[kind] += 1;
         }
     }
-    assert!(traced.iter().all(|&count| count > 10), "{traced:?}");
+    assert!(traced.iter().all(|&count| count > 5), "{traced:?}");
 }
 
 #[test]
 fn work_along_the_motion_is_the_work_that_the_solver_states() {
     for (path, transition) in paths() {
-        let (motion, work) = (&*path.motion, work_of(&*path.motion));
+        let (motion, work) = (&*path.motion, work_of(&*path.motion, path.work));
         assert!(relative(work, path.work) < 1e-9, "{transition:?} {}: {work} {}", motion.duration(), path.work);
     }
 }
