@@ -15,7 +15,7 @@ use slipsweep::plot::table::{Condition, Request, Source};
 use slipsweep::plot::{COLUMN, Format, PAGE};
 use slipsweep::sweep::units_of;
 use slipsweep::table;
-use slipsweep::verify::{Audit, verify};
+use slipsweep::verify::{VerifyError, verify};
 
 use crate::error::{self, defect};
 use crate::rows::{Rows, with_nan};
@@ -119,10 +119,8 @@ impl Dataset {
     fn verify(&self, py: Python<'_>, sample: u64, seed: u64) -> PyResult<(String, usize)> {
         let (path, manifest) = (self.folder.path().to_owned(), self.manifest.clone());
         let work = move || {
-            verify(&path, &manifest, sample, seed).map(|audits| {
-                let text: Vec<String> = audits.iter().map(text::audit).collect();
-                (text.join("\n"), audits.iter().map(Audit::errors).sum())
-            })
+            let audits = verify(&path, &manifest, sample, seed)?;
+            Ok::<_, VerifyError>((text::audit(&audits), audits.iter().map(|audit| audit.errors).sum()))
         };
         interruptible(py, || (), work)?.map_err(defect)
     }

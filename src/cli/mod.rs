@@ -139,7 +139,7 @@ pub mod text {
     pub use super::plan::in_words as plan;
     pub use super::summary::statistics as summary;
     pub use super::trace::{Traced, traced};
-    pub use super::verify::summary as audit;
+    pub use super::verify::report as audit;
 }
 
 impl Failure {

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use indexmap::IndexMap;
+
 use super::watch::waiting;
 use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, whole, words};
-use crate::dataset::Cell;
-use crate::verify::{Audit, MAX_DIFFERENCE_RTOLS, verify as audit};
+use crate::dataset::{Cell, Row};
+use crate::verify::{Audit, MAX_DIFFERENCE_RTOLS, Worst, verify as audit};
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
@@ -32,13 +34,11 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let (_, manifest) = dataset(path)?;
     let again = || audit(path, &manifest, arguments.sample, arguments.seed);
     let audits = waiting("solving the sample again", again).map_err(Failure::failed)?;
-    let text: Vec<String> = audits.iter().map(summary).collect();
-    say(&text.join("\n"))?;
-    let errors: usize = audits.iter().map(Audit::errors).sum();
+    say(&report(&audits))?;
+    let errors: usize = audits.iter().map(|audit| audit.errors).sum();
     if errors > 0 {
         let message = format!(
-            "error: {} beyond {MAX_DIFFERENCE_RTOLS} rtol\n  help: the rows are listed above; a part that was changed is made again if its file is \
-             deleted and the sweep run",
+            "error: {} beyond {MAX_DIFFERENCE_RTOLS} rtol\n  help: if a part was changed, delete its file and run the sweep again",
             words::things(errors as u64, "number")
         );
         return Err(Failure { code: EXIT_NOT_CONVERGED, message });
@@ -46,55 +46,59 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Number of columns whose worst row is shown if none fails. Chosen: the answer fits a screen.
-const MIN_SHOWN_COLUMNS: usize = 2;
+/// Number of columns that are named if none fails. Chosen: a table of the answer fits a line.
+const MIN_NAMED_COLUMNS: usize = 2;
 
 /// A difference in units of rtol.
 fn units(value: f64) -> String {
     if value < 1e5 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
 
-/// The audit of one table in a few lines.
-pub fn summary(audit: &Audit) -> String {
-    let mut text =
-        format!("{}: {} sampled, rtol {:e}\n", audit.table, words::things(audit.rows as u64, "row"), audit.rtol);
-    let mut lines = Vec::new();
-    for (column, all) in &audit.columns {
-        let at =
-            |fraction: f64| all.get(((all.len() - 1) as f64 * fraction).ceil() as usize).copied().unwrap_or(f64::NAN);
-        let cells = [at(0.5), at(0.99), at(1.0)].map(units);
-        lines.push([(*column).to_owned(), words::count(all.len() as u64)].into_iter().chain(cells).collect());
+/// Whether a number differs by too much.
+fn is_failing(worst: &&Worst) -> bool {
+    worst.difference > MAX_DIFFERENCE_RTOLS
+}
+
+/// The audits: a line for each table, the rows with numbers that differ by too much, the unchecked rows, and the verdict if it is good.
+pub fn report(audits: &[Audit]) -> String {
+    let mut lines = vec![["table", "rows", "rtol", "greatest differences in rtol"].map(str::to_owned).to_vec()];
+    for audit in audits {
+        let failing = audit.worst.iter().filter(is_failing).count();
+        let named = audit.worst.iter().take(failing.max(MIN_NAMED_COLUMNS));
+        let named = named.map(|worst| (worst.column, units(worst.difference))).filter(|(_, units)| units != "0.000");
+        let named: Vec<String> = named.map(|(column, units)| format!("{column} {units}")).collect();
+        let named = if named.is_empty() { "below 0.001".to_owned() } else { named.join(", ") };
+        lines.push(vec![audit.table.clone(), words::count(audit.rows as u64), format!("{:e}", audit.rtol), named]);
     }
-    if !lines.is_empty() {
-        lines.insert(0, ["difference/rtol", "rows", "median", "99 %", "greatest"].map(str::to_owned).to_vec());
-        text.push_str(&words::aligned(&lines, 2));
+    let mut text = words::aligned(&lines, 0);
+    audits.iter().for_each(|audit| text.push_str(&failures(audit)));
+    for Audit { table, unchecked, .. } in audits {
+        for (reason, rows) in unchecked {
+            text.push_str(&format!("{table}: {} not checked: {reason}\n", words::things(*rows, "row")));
+        }
     }
-    // Every failing column, or else the columns with the greatest differences.
-    let failing = audit.worst.iter().filter(|worst| worst.difference > MAX_DIFFERENCE_RTOLS).count();
-    let shown = audit.worst.iter().filter(|worst| worst.difference > 0.0);
-    for worst in shown.take(failing.max(MIN_SHOWN_COLUMNS)) {
-        let cells: Vec<String> = worst
-            .row
-            .iter()
-            .map(|(name, cell)| match cell {
-                Cell::Number(value) => format!("{name} = {value:?}"),
-                Cell::Word(word) => format!("{name} = {word}"),
-                Cell::Missing => format!("{name} = -"),
-            })
-            .collect();
-        let (column, difference, expected) = (worst.column, units(worst.difference), &worst.expected);
-        let note = if audit.is_converted { " (dimensionless)" } else { "" };
-        let (row, cells) = (worst.number, cells.join(", "));
-        text.push_str(&match worst.difference > MAX_DIFFERENCE_RTOLS {
-            true => format!("  row {row}: {column} differs by {difference} rtol, the check has {expected}{note}\n"),
-            false => {
-                format!("  greatest difference of {column}: {difference} rtol in row {row}, the check has {expected}{note}\n")
-            }
+    if audits.iter().all(|audit| audit.errors == 0) {
+        text.push_str(&format!("no number differs by more than {MAX_DIFFERENCE_RTOLS} rtol\n"));
+    }
+    text
+}
+
+/// The worst row of each failing column, with the columns for which it is the worst.
+fn failures(audit: &Audit) -> String {
+    let failing: Vec<&Worst> = audit.worst.iter().filter(is_failing).collect();
+    let rows: IndexMap<u64, &Row> = failing.iter().map(|worst| (worst.number, &worst.row)).collect();
+    let mut text = String::new();
+    for (number, row) in rows {
+        let cells = row.iter().filter_map(|(name, cell)| match cell {
+            Cell::Number(value) => Some(format!("{name} = {value:?}")),
+            Cell::Word(word) => Some(format!("{name} = {word}")),
+            Cell::Missing => None,
         });
-        text.push_str(&format!("    {cells}\n"));
-    }
-    for (reason, rows) in &audit.unchecked {
-        text.push_str(&format!("  not checked in {}: {reason}\n", words::things(*rows, "row")));
+        let (table, note) = (&audit.table, if audit.is_converted { " (dimensionless)" } else { "" });
+        text.push_str(&format!("{table}, row {number}{note}: {}\n", cells.collect::<Vec<_>>().join(", ")));
+        for Worst { column, difference, expected, .. } in failing.iter().filter(|worst| worst.number == number) {
+            text.push_str(&format!("  {column} differs by {} rtol, the check has {expected}\n", units(*difference)));
+        }
     }
     text
 }

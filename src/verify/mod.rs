@@ -48,8 +48,8 @@ pub struct Audit {
     pub is_converted: bool,
     /// Rows of the sample.
     pub rows: usize,
-    /// Differences of each column in units of rtol, ascending.
-    pub columns: IndexMap<&'static str, Vec<f64>>,
+    /// Numbers beyond [`MAX_DIFFERENCE_RTOLS`].
+    pub errors: usize,
     /// For each column the row with the greatest difference, worst first.
     pub worst: Vec<Worst>,
     /// Rows that were not checked, by reason.
@@ -107,7 +107,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             rtol,
             is_converted: !is_reduced && units != Units::Scaled,
             rows: rows.len(),
-            columns: IndexMap::new(),
+            errors: 0,
             worst: Vec::new(),
             unchecked: IndexMap::new(),
         };
@@ -132,7 +132,6 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         if missing > 0 {
             audit.unchecked.insert("their part is missing; `slipsweep run` computes it", missing);
         }
-        audit.columns.values_mut().for_each(|differences| differences.sort_by(f64::total_cmp));
         audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
         audits.push(audit);
     }
@@ -168,18 +167,16 @@ impl Audit {
         }
         for Difference { column, size, expected } in differences {
             let difference = size / self.rtol;
-            self.columns.entry(column).or_default().push(difference);
+            self.errors += usize::from(difference > MAX_DIFFERENCE_RTOLS);
+            let known = self.worst.iter().position(|known| known.column == column);
+            if known.is_some_and(|place| difference <= self.worst[place].difference) {
+                continue;
+            }
             let worst = Worst { column, difference, expected, number, row: row.clone() };
-            match self.worst.iter_mut().find(|known| known.column == column) {
-                Some(known) if difference > known.difference => *known = worst,
-                Some(_) => {}
+            match known {
+                Some(place) => self.worst[place] = worst,
                 None => self.worst.push(worst),
             }
         }
-    }
-
-    /// Numbers beyond [`MAX_DIFFERENCE_RTOLS`].
-    pub fn errors(&self) -> usize {
-        self.columns.values().flatten().filter(|difference| **difference > MAX_DIFFERENCE_RTOLS).count()
     }
 }
