@@ -51,7 +51,7 @@ impl Cells {
     pub(super) fn none(kind: &DataType) -> Option<Cells> {
         match kind {
             DataType::Float64 => Some(Cells::Numbers(Vec::new())),
-            DataType::Boolean => Some(Cells::Words(Vec::new(), ["no", "yes"].map(str::to_owned).into())),
+            DataType::Boolean => Some(Cells::Words(Vec::new(), ["false", "true"].map(str::to_owned).into())),
             kind if *kind == label() => Some(Cells::Words(Vec::new(), Vec::new())),
             _ => None,
         }

@@ -29,7 +29,7 @@ pub struct Heading {
     pub unit: String,
     /// Its meaning.
     pub doc: String,
-    /// Whether it contains numbers; otherwise words, or flags as `yes` and `no`.
+    /// Whether it contains numbers; otherwise words, or flags as `true` and `false`.
     pub is_number: bool,
 }
 

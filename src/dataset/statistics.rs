@@ -113,7 +113,7 @@ impl TableStatistics {
             match column.kind {
                 Kind::Number(_) | Kind::Quantity(_) => statistics.ranges.push(Range::of(column.name, cells)),
                 Kind::Label(words) => statistics.words.push((column.name.to_owned(), counts(words, cells))),
-                Kind::Flag => statistics.words.push((column.name.to_owned(), counts(&["no", "yes"], cells))),
+                Kind::Flag => statistics.words.push((column.name.to_owned(), counts(&["false", "true"], cells))),
             }
         }
         let view = row_index.view(rows.clone());

@@ -69,7 +69,7 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
         let critical = critical(v);
         row.compare(k_c, critical.high);
         let is_stable = !k.is_finite() || (double(k) - critical).high > 0.0;
-        row.compare_word(stable, if is_stable { "yes" } else { "no" });
+        row.compare_word(stable, if is_stable { "true" } else { "false" });
     }
     if friction == Friction::Regularised {
         // k is critical there, and no twice as great velocity is stable.

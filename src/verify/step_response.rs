@@ -100,7 +100,7 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     }
     if !(k.is_finite() && v_i != v_f) {
         row.compare_word("outcome", "settled");
-        row.compare_word("stick_slip", "no");
+        row.compare_word("stick_slip", "false");
         ["v_peak", "v_trough"].iter().for_each(|column| row.compare(column, v_f));
         row.compare_relative("settling_time", 0.0, 1.0);
         CYCLE.iter().chain(&["t_peak"]).for_each(|column| row.compare(column, None));
@@ -202,14 +202,29 @@ struct LastCycle {
 }
 
 impl LastCycle {
-    /// The last cycle, if there are two.
-    fn of(events: &Events, v_f: f64) -> Option<LastCycle> {
-        let [.., first, second, third] = events.rises.as_slice() else { return None };
-        let before = range(events, v_f, (first.t, second.t));
-        let [top, bottom] = range(events, v_f, (second.t, third.t)).map(|event| event.v);
-        let period = third.t - second.t;
-        let apart = (period / (second.t - first.t) - 1.0).abs() + (top / before[0].v - 1.0).abs();
-        Some(LastCycle { period, top, bottom, apart })
+    /// The last cycle, if there are enough.
+    fn of(events: &Events, v_f: f64, rtol: f64) -> Option<LastCycle> {
+        let cycle = |back: usize| {
+            let first = events.rises.len().checked_sub(2 + back)?;
+            let [from, to] = [events.rises[first].t, events.rises[first + 1].t];
+            let [top, bottom] = range(events, v_f, (from, to)).map(|event| event.v);
+            Some(LastCycle { period: to - from, top, bottom, apart: f64::INFINITY })
+        };
+        // Cycles far apart determine a slow change.
+        let stride = (events.rises.len() / 4).max(1);
+        let (first, second, third) = (cycle(2 * stride)?, cycle(stride)?, cycle(0)?);
+        let change = |one: &LastCycle, next: &LastCycle| {
+            (next.period / one.period - 1.0).abs() + (next.top / one.top - 1.0).abs()
+        };
+        let [before, last] = [change(&first, &second), change(&second, &third)];
+        let apart = match () {
+            () if last < rtol => last,
+            // The further changes of an approach are a geometric series.
+            () if last < before => last * last / (before - last),
+            // An oscillation that still grows.
+            () => f64::INFINITY,
+        };
+        Some(LastCycle { apart, ..third })
     }
 }
 
@@ -226,7 +241,7 @@ fn compare(row: &mut CheckedRow<'_>, step: &VelocityStep, followed: &Followed) {
     }
     // A response does not settle at unstable steady sliding.
     let settled = events.settled.filter(|_| SteadySliding::new(law, k, m, v_f).is_stable());
-    let last = LastCycle::of(&events, v_f);
+    let last = LastCycle::of(&events, v_f, rtol);
     let vague = last.as_ref().map_or(f64::INFINITY, |last| 1.0 + last.apart / rtol);
     // A limit cycle that is approached slowly has greater extremes than any cycle of the trace.
     if settled.is_some() || vague <= MAX_CYCLE_RTOLS {
@@ -239,7 +254,7 @@ fn compare(row: &mut CheckedRow<'_>, step: &VelocityStep, followed: &Followed) {
         }
     }
     row.compare_word("outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
-    row.compare_word("stick_slip", if settled.is_some() { "no" } else { "yes" });
+    row.compare_word("stick_slip", if settled.is_some() { "false" } else { "true" });
     if let Some((entry, speed)) = settled {
         if events.margin > EDGE_RTOLS * rtol {
             let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;

@@ -257,7 +257,7 @@ impl FilteredTable {
         let columns = table::find(&self.table).map_or(&[][..], |table| table.columns());
         match columns.iter().find(|known| known.name == column).map(|known| known.kind) {
             Some(Kind::Label(words)) => owned(words),
-            Some(Kind::Flag) => owned(&["no", "yes"]),
+            Some(Kind::Flag) => owned(&["false", "true"]),
             _ => Vec::new(),
         }
     }

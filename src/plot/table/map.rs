@@ -266,9 +266,9 @@ impl Shading<'_> {
 
     fn meaning(&self, word: &str) -> String {
         match word {
-            "no" if self.is_stability() => "unstable".to_owned(),
-            "yes" if self.is_stability() => "stable".to_owned(),
-            "no" | "yes" => format!("{}: {word}", label::name(self.column)),
+            "false" if self.is_stability() => "unstable".to_owned(),
+            "true" if self.is_stability() => "stable".to_owned(),
+            "false" | "true" => format!("{}: {word}", label::name(self.column)),
             word => word.replace('_', " "),
         }
     }
