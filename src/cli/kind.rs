@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, refused};
 use crate::dataset::Folder;
+use crate::sweep::path_hint;
 
 /// The file that makes a folder a dataset.
 pub const MANIFEST: &str = "manifest.json";
@@ -120,7 +121,7 @@ impl Kind {
             Kind::Picture => ("a picture", "open it in a viewer".to_owned()),
             Kind::File => ("a file of another kind", ours()),
             Kind::Device => ("a device or a named pipe, not a file", ours()),
-            Kind::Nothing => ("there is no such file or folder", "check the name".to_owned()),
+            Kind::Nothing => ("there is no such file or folder", path_hint(path, "")),
         }
     }
 }

@@ -11,12 +11,11 @@ use super::output::{self, Output};
 use super::{
     EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, whole, words, write_file, wrong,
 };
-use crate::dataset::frame::{self, Cells};
+use crate::dataset::frame;
 use crate::dataset::{Cell, Folder, Manifest, ManifestTable, Row};
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Friction, StateLaw, Units};
-use crate::names::hint;
-use crate::plot::table::Condition;
+use crate::plot::table::{Condition, FilteredTable};
 use crate::protocol::shortcut::Case;
 use crate::protocol::{Motion, Status};
 use crate::sweep::{Spec, friction, units};
@@ -661,24 +660,17 @@ impl RowSource<'_> {
         Ok((file, row))
     }
 
-    /// The numbers of the first rows of the present parts, and their files.
-    fn files(&self) -> impl Iterator<Item = (u64, PathBuf)> {
-        let there = self.folder.parts_there(self.table).into_iter();
-        there.map(|part| (self.table.rows_of(part).start, self.folder.part(&self.table.name, part)))
-    }
-
     /// The only row that meets all conditions.
     fn only_row(&self, conditions: &[String]) -> Result<u64, Failure> {
         let all = conditions.iter().map(|text| Condition::all(text)).collect::<Result<Vec<_>, _>>()?.concat();
-        let found = self.rows(&all)?;
+        let found = self.rows(&all);
         let (at, name, conditions) = (self.path.display(), &self.table.name, conditions.join(", "));
         match found.as_slice() {
             [row] => Ok(*row),
-            [] => {
-                let nearest = self.nearest(&all)?;
-                let found = format!("{at}: no row of `{name}` meets --where {conditions:?}{nearest}");
-                Err(wrong(format!("{found}\n  help: slipsweep head {at} {name}")))
-            }
+            [] => Err(match FilteredTable::new(self.folder, self.manifest, name, &all) {
+                Err(error) => error.into(),
+                Ok(_) => Failure::failed(format!("{at}: the dataset has changed\n  help: repeat the command")),
+            }),
             several => {
                 let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
                 let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
@@ -691,49 +683,22 @@ impl RowSource<'_> {
         }
     }
 
-    /// The first rows that meet all conditions, more than [`MAX_NAMED_ROWS`] if there are more. Reads only the columns of the conditions.
-    fn rows(&self, conditions: &[Condition]) -> Result<Vec<u64>, Failure> {
+    /// The first rows that meet all conditions, more than [`MAX_NAMED_ROWS`] if there are more; none if a column of a condition cannot be read.
+    fn rows(&self, conditions: &[Condition]) -> Vec<u64> {
         let names: Vec<&str> = conditions.iter().map(|condition| condition.column.as_str()).collect();
         let mut found = Vec::new();
-        for (first, file) in self.files() {
-            if found.is_empty() {
-                let headings = frame::headings(&file).map_err(Failure::failed)?.0;
-                let known: Vec<&str> = headings.iter().map(|heading| heading.name.as_str()).collect();
-                if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-                    let found = format!("--where: `{}` has no column `{unknown}`", self.table.name);
-                    return Err(refused(found, known.join(", "), hint(unknown, known.iter().copied())));
-                }
-            }
-            let frame = frame::read(&file, &names).map_err(Failure::failed)?;
+        for part in self.folder.parts_there(self.table) {
+            let Ok(frame) = frame::read(&self.folder.part(&self.table.name, part), &names) else { return Vec::new() };
             let meets = |row: &usize| {
                 frame.columns.iter().zip(conditions).all(|((_, cells), condition)| condition.holds_in(cells, *row))
             };
+            let first = self.table.rows_of(part).start;
             found.extend((0..frame.height).filter(meets).take(MAX_NAMED_ROWS + 1).map(|row| first + row as u64));
             if found.len() > MAX_NAMED_ROWS {
                 break;
             }
         }
-        Ok(found)
-    }
-
-    /// The values that are nearest to the wanted numbers that the table does not have, as a line of a message.
-    fn nearest(&self, conditions: &[Condition]) -> Result<String, Failure> {
-        let mut missed = Vec::new();
-        for condition in conditions {
-            let Some(wanted) = condition.wanted() else { continue };
-            let mut best: Option<f64> = None;
-            for (_, file) in self.files() {
-                let frame = frame::read(&file, &[&condition.column]).map_err(Failure::failed)?;
-                let Some((_, Cells::Numbers(numbers))) = frame.columns.into_iter().next() else { continue };
-                let off = |value: &f64| if condition.holds(*value) { 0.0 } else { (value - wanted).abs() };
-                let numbers = numbers.into_iter().filter(|value| !value.is_nan());
-                best = numbers.chain(best).min_by(|one, other| off(one).total_cmp(&off(other)));
-            }
-            if let Some(best) = best.filter(|best| !condition.holds(*best)) {
-                missed.push(format!("{} = {best:?}", condition.column));
-            }
-        }
-        Ok(if missed.is_empty() { String::new() } else { format!("\n  found: nearest {}", missed.join(", ")) })
+        found
     }
 
     /// The axes in which rows differ.

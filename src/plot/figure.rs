@@ -241,7 +241,11 @@ impl Entry {
         let drawn = (0..names.len()).filter(|&place| leaders[place] == place && names.len() > 1);
         let entry = |place| {
             let same = names.iter().zip(leaders).filter(|(_, leader)| **leader == place);
-            Entry { key: key(place), text: same.map(|(name, _)| name.as_ref()).collect::<Vec<_>>().join("; ") }
+            let text = match same.map(|(name, _)| name.as_ref()).collect::<Vec<_>>().as_slice() {
+                [first, rest @ ..] if rest.len() > 1 => format!("{first} and {} more", rest.len()),
+                few => few.join("; "),
+            };
+            Entry { key: key(place), text }
         };
         drawn.map(entry).collect()
     }

@@ -13,10 +13,10 @@ use sqlparser::ast::{
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 
-use super::Source;
 use super::scan::Files;
 use super::units::{Columns, units};
 use super::walk::walk;
+use super::{QueryError, Source};
 use crate::names::hint;
 
 /// A valid query.
@@ -25,20 +25,10 @@ pub struct CheckedQuery {
     pub query: Box<Query>,
     /// The known units of its columns, by name.
     pub units: Columns,
+    /// The tables in its FROM.
+    pub read: HashSet<String>,
     /// A fault of a query whose names are valid.
-    pub mixed: Option<InvalidQuery>,
-}
-
-/// The fault of a query, and its help.
-pub struct InvalidQuery {
-    pub found: String,
-    pub help: String,
-}
-
-impl InvalidQuery {
-    fn new(found: impl Into<String>, help: impl Into<String>) -> InvalidQuery {
-        InvalidQuery { found: found.into(), help: help.into() }
-    }
+    pub mixed: Option<QueryError>,
 }
 
 /// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
@@ -61,33 +51,32 @@ impl CheckedQuery {
     /// # Errors
     ///
     /// What is wrong with the query, and how to correct it.
-    pub fn parse(sql: &str, sources: &[Source]) -> Result<CheckedQuery, InvalidQuery> {
+    pub fn parse(sql: &str, sources: &[Source]) -> Result<CheckedQuery, QueryError> {
         let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
             ParserError::RecursionLimitExceeded => {
-                InvalidQuery::new("parentheses are nested too deeply", "simplify the query")
+                QueryError::sql("parentheses are nested too deeply", "simplify the query")
             }
             ParserError::TokenizerError(text) | ParserError::ParserError(text) => {
-                InvalidQuery::new(format!("not SQL: {text}"), GENERAL_HELP)
+                QueryError::sql(format!("not SQL: {text}"), GENERAL_HELP)
             }
         })?;
         let [statement] = <[Statement; 1]>::try_from(statements).map_err(|statements| {
             let found = if statements.is_empty() { "the query is empty" } else { "several statements" };
-            InvalidQuery::new(found, "write one SELECT")
+            QueryError::sql(found, "write one SELECT")
         })?;
         let Statement::Query(mut query) = statement else {
             let words = statement.to_string();
             let first = words.split_whitespace().next().unwrap_or_default().to_uppercase();
             return Err(match first.as_str() {
-                "SHOW" | "DESCRIBE" | "EXPLAIN" | "DESC" => InvalidQuery::new(
+                "SHOW" | "DESCRIBE" | "EXPLAIN" | "DESC" => QueryError::sql(
                     format!("{first} is not supported"),
                     "`slipsweep head DATASET` lists the tables with their columns; write one SELECT",
                 ),
-                _ => {
-                    InvalidQuery::new(format!("{first} is refused: `query` reads and never writes"), "write one SELECT")
-                }
+                _ => QueryError::sql(format!("{first} is refused: `query` reads and never writes"), "write one SELECT"),
             });
         };
-        let mut check = Check { sources, tables: HashSet::new(), windows: HashSet::new(), fault: None, mixed: None };
+        let [tables, read, windows] = Default::default();
+        let mut check = Check { sources, tables, read, windows, fault: None, mixed: None };
         walk(query.as_mut(), &mut check);
         if let Some(fault) = check.fault {
             return Err(fault);
@@ -98,7 +87,7 @@ impl CheckedQuery {
         let tables = sources.iter().map(|source| (source.name.clone(), columns(source))).collect();
         let units = units(&query, &tables);
         walk(query.as_mut(), &mut PolarsDialect { words });
-        Ok(CheckedQuery { query, units, mixed: check.mixed })
+        Ok(CheckedQuery { query, units, read: check.read, mixed: check.mixed })
     }
 }
 
@@ -107,11 +96,13 @@ struct Check<'a> {
     sources: &'a [Source],
     /// Names of tables that the query defines itself.
     tables: HashSet<String>,
+    /// Names of all tables in FROM.
+    read: HashSet<String>,
     /// Names of windows with an order.
     windows: HashSet<String>,
-    fault: Option<InvalidQuery>,
-    /// A column and an aggregate in one SELECT without GROUP BY.
-    mixed: Option<InvalidQuery>,
+    fault: Option<QueryError>,
+    /// A column and an aggregate in one SELECT or its ORDER BY, without GROUP BY.
+    mixed: Option<QueryError>,
 }
 
 impl Check<'_> {
@@ -123,8 +114,22 @@ impl Check<'_> {
     }
 
     fn refuse(&mut self, found: impl Into<String>, help: impl Into<String>) -> ControlFlow<()> {
-        self.fault = Some(InvalidQuery::new(found, help));
+        self.fault = Some(QueryError::sql(found, help));
         ControlFlow::Break(())
+    }
+
+    /// Records the first of `columns` in or after a SELECT of an aggregate without GROUP BY.
+    fn mix(&mut self, select: &Select, mut columns: impl Iterator<Item = String>) {
+        if is_empty(&select.group_by)
+            && let Some(aggregate) = select.projection.iter().filter_map(expression).find_map(first_plain_aggregate)
+            && let Some(column) = columns.next()
+        {
+            // polars would repeat the aggregate in every row, and order the only row.
+            self.mixed = Some(QueryError::sql(
+                format!("`{column}` is neither in GROUP BY nor in an aggregate"),
+                format!("write {aggregate} alone or with GROUP BY; for every row, write {aggregate} OVER ()"),
+            ));
+        }
     }
 }
 
@@ -139,6 +144,14 @@ impl VisitorMut for Check<'_> {
                 return self.refuse(format!("WITH {name}: a table has this name"), "choose another name");
             }
             self.tables.insert(name.clone());
+        }
+        if let SetExpr::Select(select) = query.body.as_ref()
+            && let Some(OrderByKind::Expressions(keys)) = query.order_by.as_ref().map(|order| &order.kind)
+        {
+            let columns = keys.iter().filter_map(|key| first_part(&key.expr, is_column, is_plain_aggregate));
+            let is_item =
+                |column: &String| select.projection.iter().any(|item| item_name(item) == column.trim_matches('"'));
+            self.mix(select, columns.filter(|column| !is_item(column)));
         }
         match query.body.as_ref() {
             SetExpr::Insert(_) | SetExpr::Update(_) | SetExpr::Delete(_) | SetExpr::Merge(_) => {
@@ -188,16 +201,7 @@ impl VisitorMut for Check<'_> {
                 "write the condition in HAVING, after GROUP BY; for OVER, filter a subquery: FROM (SELECT ...) AS t WHERE ...",
             );
         }
-        if is_empty(&select.group_by)
-            && let Some(aggregate) = select.projection.iter().filter_map(expression).find_map(first_plain_aggregate)
-            && let Some(column) = select.projection.iter().find_map(first_bare_column)
-        {
-            // polars would repeat the aggregate in every row.
-            self.mixed = Some(InvalidQuery::new(
-                format!("`{column}` is neither in GROUP BY nor in an aggregate"),
-                format!("write {aggregate} alone or with GROUP BY; for every row, write {aggregate} OVER ()"),
-            ));
-        }
+        self.mix(select, select.projection.iter().filter_map(first_bare_column));
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
         let mut items = select.projection.iter().filter_map(expression).chain(&select.qualify);
         if is_grouped && let Some(window) = items.find_map(first_window) {
@@ -236,11 +240,13 @@ impl VisitorMut for Check<'_> {
             [ObjectNamePart::Identifier(word)] => word.value.clone(),
             _ => name.to_string(),
         };
-        if self.tables.contains(&word) || self.sources.iter().any(|source| source.name == word) {
+        let names: Vec<&str> = self.sources.iter().map(|source| source.name.as_str()).collect();
+        if self.tables.contains(&word) || names.contains(&word.as_str()) {
+            self.read.insert(word);
             return ControlFlow::Continue(());
         }
-        let help = hint(&word, self.sources.iter().map(|source| source.name.as_str()));
-        self.refuse(format!("no table `{word}`"), help)
+        let help = hint(&word, names.iter().copied());
+        self.refuse(format!("no table `{word}`\n  expected: {}", names.join(", ")), help)
     }
 }
 
@@ -257,6 +263,15 @@ fn expression(item: &SelectItem) -> Option<&Expr> {
     match item {
         SelectItem::UnnamedExpr(expression) | SelectItem::ExprWithAlias { expr: expression, .. } => Some(expression),
         _ => None,
+    }
+}
+
+/// The name of an item of SELECT; empty for several columns.
+fn item_name(item: &SelectItem) -> String {
+    match item {
+        SelectItem::UnnamedExpr(expression) => name(expression),
+        SelectItem::ExprWithAlias { alias, .. } => alias.value.clone(),
+        _ => String::new(),
     }
 }
 
@@ -526,12 +541,21 @@ fn least(argument: &Expr) -> Expr {
 /// The name of a column without `AS`, as in DuckDB; `count(*)` is `count`.
 pub fn name(expression: &Expr) -> String {
     match expression {
-        Expr::Identifier(name) => name.value.clone(),
         Expr::CompoundIdentifier(names) => names.last().map(|name| name.value.clone()).unwrap_or_default(),
         Expr::Nested(inner) => name(inner),
-        Expr::BinaryOp { left, op, right } => format!("({} {op} {})", name(left), name(right)),
-        Expr::Ceil { expr, .. } => format!("ceil({})", name(expr)),
-        Expr::Floor { expr, .. } => format!("floor({})", name(expr)),
+        other => written(other),
+    }
+}
+
+/// An expression in the name of a column.
+fn written(expression: &Expr) -> String {
+    match expression {
+        Expr::Identifier(name) => name.value.clone(),
+        Expr::CompoundIdentifier(names) => names.iter().map(|name| name.value.as_str()).collect::<Vec<_>>().join("."),
+        Expr::Nested(inner) => written(inner),
+        Expr::BinaryOp { left, op, right } => format!("({} {op} {})", written(left), written(right)),
+        Expr::Ceil { expr, .. } => format!("ceil({})", written(expr)),
+        Expr::Floor { expr, .. } => format!("floor({})", written(expr)),
         Expr::Function(function) => {
             let called = function.name.to_string().to_lowercase();
             let FunctionArguments::List(list) = &function.args else { return expression.to_string() };
@@ -547,7 +571,7 @@ pub fn name(expression: &Expr) -> String {
                 _ => "",
             };
             let argument = |argument: &FunctionArg| match argument {
-                FunctionArg::Unnamed(FunctionArgExpr::Expr(inner)) => name(inner),
+                FunctionArg::Unnamed(FunctionArgExpr::Expr(inner)) => written(inner),
                 other => other.to_string(),
             };
             let arguments: Vec<String> = list.args.iter().map(argument).collect();

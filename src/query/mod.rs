@@ -23,7 +23,7 @@ use crate::dataset::{DatasetError, guarded};
 use crate::names::{hint, nearest};
 
 pub use answer::{Answer, AnswerError, Format};
-use checked_query::{CheckedQuery, InvalidQuery};
+use checked_query::CheckedQuery;
 pub use scan::is_unreadable;
 pub use source::Source;
 
@@ -39,10 +39,10 @@ pub struct Tables {
 pub enum QueryError {
     /// The path leads to no table.
     #[error("{path}: {found}\n  expected: {expected}\n  help: {help}")]
-    Path { path: String, found: String, expected: &'static str, help: &'static str },
+    Path { path: String, found: String, expected: &'static str, help: String },
     /// The query is not valid for these tables.
-    #[error("{found}\n  expected: a SELECT from these tables:{tables}\n  help: {help}")]
-    Sql { found: String, tables: String, help: String },
+    #[error("{found}\n  help: {help}")]
+    Sql { found: String, help: String },
     /// A part is damaged, or belongs to another dataset.
     #[error(transparent)]
     Part(Box<DatasetError>),
@@ -57,6 +57,10 @@ pub enum QueryError {
 const MAX_ERROR_CHARS: usize = 200;
 
 impl QueryError {
+    fn sql(found: impl Into<String>, help: impl Into<String>) -> QueryError {
+        QueryError::Sql { found: found.into(), help: help.into() }
+    }
+
     /// Whether the path or the query is wrong, rather than the files or the machine.
     pub fn is_wrong(&self) -> bool {
         matches!(self, QueryError::Path { .. } | QueryError::Sql { .. })
@@ -88,7 +92,7 @@ impl Tables {
     ///
     /// If the query is not one SELECT from these tables.
     pub fn query(&self, sql: &str) -> Result<Answer, QueryError> {
-        let checked = self.parse(sql)?;
+        let checked = CheckedQuery::parse(sql, &self.sources)?;
         let planned = || -> PolarsResult<(LazyFrame, std::sync::Arc<Schema>)> {
             let tables = self.sources.iter().map(|source| (source.name.as_str(), source.frame.clone()));
             let mut frame = plan(tables, &checked.query.to_string())?;
@@ -97,9 +101,9 @@ impl Tables {
         };
         let (frame, schema) = guarded(planned)
             .unwrap_or_else(|| Err(PolarsError::ComputeError("the engine does not support this query".into())))
-            .map_err(|error| self.explain(sql, &error))?;
-        if let Some(InvalidQuery { found, help }) = checked.mixed {
-            return Err(self.refuse(found, &help));
+            .map_err(|error| self.explain(sql, &checked, &error))?;
+        if let Some(error) = checked.mixed {
+            return Err(error);
         }
         let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
         let unit = |name: &String| {
@@ -112,32 +116,29 @@ impl Tables {
         Ok(Answer { columns, units, frame, streaming })
     }
 
-    fn parse(&self, sql: &str) -> Result<CheckedQuery, QueryError> {
-        CheckedQuery::parse(sql, &self.sources).map_err(|InvalidQuery { found, help }| self.refuse(found, &help))
-    }
-
     /// The error of a query that failed during its computation, if the query is to blame: it also fails on the first rows alone, such as a sum
     /// of words. Otherwise `None`.
     pub fn diagnose(&self, sql: &str) -> Option<QueryError> {
-        let checked = self.parse(sql).ok()?;
+        let checked = CheckedQuery::parse(sql, &self.sources).ok()?;
         let mut first = Vec::new();
         for source in &self.sources {
             first.push((source.name.as_str(), source.frame.clone().limit(1).collect().ok()?.lazy()));
         }
         let answered = guarded(|| plan(first, &checked.query.to_string()).and_then(LazyFrame::collect));
-        Some(self.explain(sql, &answered?.err()?))
+        Some(self.explain(sql, &checked, &answered?.err()?))
     }
 
     /// The fault of a query.
-    fn explain(&self, sql: &str, error: &PolarsError) -> QueryError {
+    fn explain(&self, sql: &str, checked: &CheckedQuery, error: &PolarsError) -> QueryError {
         let text = error.to_string();
         // The first line contains the reason; lists of names and query plans follow.
         let line = text.lines().next().unwrap_or_default().trim_end_matches(':');
         let line = crate::names::shown(line, MAX_ERROR_CHARS);
         let line = &*line;
-        if line.contains("unable to find column") {
-            let name = line.split('"').nth(1).unwrap_or_default();
-            let columns = || self.sources.iter().flat_map(|source| &source.columns).map(String::as_str);
+        if line.contains("unable to find column") || line.contains("no column named") {
+            let name = line.split(['"', '\'']).nth(1).unwrap_or_default();
+            let read = || self.sources.iter().filter(|source| checked.read.contains(&source.name));
+            let columns = || read().flat_map(|source| &source.columns).map(String::as_str);
             let help = match nearest(name, columns()) {
                 None if sql.contains(&format!("\"{name}\"")) => {
                     format!("text goes in single quotes: '{name}'; double quotes are for names of columns")
@@ -145,7 +146,12 @@ impl Tables {
                 None => format!("choose one of these; text goes in single quotes: '{name}'"),
                 _ => hint(name, columns()),
             };
-            return self.refuse(format!("no column `{name}`"), &help);
+            let tables = read().map(|source| format!("{}: {}", source.name, source.columns.join(", ")));
+            let expected = match tables.collect::<Vec<_>>().join("\n    ") {
+                tables if tables.is_empty() => "FROM and the name of a table".to_owned(),
+                tables => format!("a column of {tables}"),
+            };
+            return QueryError::sql(format!("no column `{name}`\n  expected: {expected}"), help);
         }
         // Names of types and of nodes of the syntax tree of polars mean nothing to a user.
         let is_internal = line.contains("Query {")
@@ -156,7 +162,7 @@ impl Tables {
         if is_internal {
             let found =
                 "a part of the query is not supported, such as EXISTS, SEMI JOIN or a subquery in an expression";
-            return self.refuse(found.to_owned(), "write it as a join, with IN, or with WITH");
+            return QueryError::sql(found, "write it as a join, with IN, or with WITH");
         }
         let known = |sign: &str| line.contains(sign);
         let (found, help) = if known("GROUP BY clause") {
@@ -174,12 +180,6 @@ impl Tables {
         } else {
             (line.to_owned(), "correct the query".to_owned())
         };
-        self.refuse(found, &help)
-    }
-
-    fn refuse(&self, found: String, help: &str) -> QueryError {
-        let columns = |source: &Source| format!("\n    {}: {}", source.name, source.columns.join(", "));
-        let tables = self.sources.iter().map(columns).collect();
-        QueryError::Sql { found, tables, help: help.to_owned() }
+        QueryError::sql(found, help)
     }
 }

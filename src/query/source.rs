@@ -12,6 +12,7 @@ use super::scan::Files;
 use super::{Answer, QueryError};
 use crate::dataset::Folder;
 use crate::dataset::frame::{self, FrameError};
+use crate::sweep::path_hint;
 
 /// A table and its files.
 pub struct Source {
@@ -42,11 +43,11 @@ const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parq
 ///
 /// A path without tables, or a file that cannot be read.
 pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
-    let wrong = |found: &str, help| QueryError::Path {
+    let wrong = |found: &str, help: &str| QueryError::Path {
         path: path.display().to_string(),
         found: found.to_owned(),
         expected: EXPECTED,
-        help,
+        help: help.to_owned(),
     };
     if path.is_dir() {
         // The folder of a table belongs to its dataset, and is checked like it.
@@ -85,7 +86,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         return Ok(sources);
     }
     if !path.exists() {
-        return Err(wrong("there is no such file or folder", "check the path"));
+        return Err(wrong("there is no such file or folder", &path_hint(path, "")));
     }
     if !path.is_file() {
         return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));

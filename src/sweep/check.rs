@@ -68,15 +68,16 @@ pub struct Request {
     pub sizes: Vec<f64>,
 }
 
-/// Help for a spec that cannot be read: the TOML file with the nearest name in the same folder, if any.
-fn path_hint(path: &Path) -> String {
+/// Help for a path that cannot be read: the nearest name with this ending in the same folder, if any.
+pub fn path_hint(path: &Path, ending: &str) -> String {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort();
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    match nearest(&stem, names.iter().filter_map(|name| name.strip_suffix(".toml"))) {
-        Some(name) => format!("did you mean `{}`?", path.with_file_name(format!("{name}.toml")).display()),
+    let name = if ending.is_empty() { path.file_name() } else { path.file_stem() };
+    let name = name.unwrap_or_default().to_string_lossy();
+    match nearest(&name, names.iter().filter_map(|name| name.strip_suffix(ending))) {
+        Some(name) => format!("did you mean `{}`?", path.with_file_name(format!("{name}{ending}")).display()),
         None => "check the path".to_owned(),
     }
 }
@@ -96,7 +97,8 @@ impl Sweep {
                 fault(error.to_string(), "a TOML file", "write the spec to a file, and name that file")
             }
             kind => {
-                let help = if kind == io::ErrorKind::NotFound { &path_hint(path) } else { "check its permissions" };
+                let hint = path_hint(path, ".toml");
+                let help = if kind == io::ErrorKind::NotFound { &hint } else { "check its permissions" };
                 fault(format!("cannot read: {error}"), "a readable TOML file", help)
             }
         })?;

@@ -23,6 +23,8 @@ pub use axis::word;
 pub use batches::Batches;
 #[cfg(feature = "cli")]
 pub(crate) use check::check_name;
+#[cfg(any(feature = "cli", feature = "query"))]
+pub(crate) use check::path_hint;
 pub use check::{Request, Sweep};
 pub use direct::{Direct, Given, RowsError};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};

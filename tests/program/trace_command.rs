@@ -448,8 +448,11 @@ fn a_row_without_a_path_states_why() {
             &["optimal", "--where", "t_f>0"],
             "error: results/rows: several rows of `optimal` meet --where \"t_f>0\"\n  found: rows 0, 1, 2, 3\n",
         ),
-        (&["optimal", "--where", "t_f=7"], "error: results/rows: no row of `optimal` meets --where \"t_f=7\"\n"),
-        (&["optimal", "--where", "t_g=7"], "error: --where: `optimal` has no column `t_g`\n"),
+        (
+            &["optimal", "--where", "t_f=7"],
+            "error: --where t_f = 7: no row of the table `optimal` meets this\n  found: t_f = ",
+        ),
+        (&["optimal", "--where", "t_g=7"], "error: --where: the table `optimal` has no column `t_g`\n"),
         (&["optimol", "--row", "1"], "error: results/rows: no table `optimol`\n"),
         (&["crossover", "--row", "0"], "error: a row of table `crossover` has no path over time\n"),
         (
@@ -461,7 +464,7 @@ fn a_row_without_a_path_states_why() {
         let found = complaint(arguments);
         assert!(found.starts_with(expected), "{arguments:?}: {found}");
     }
-    assert!(complaint(&["optimal", "--where", "t_f=7"]).contains("\n  found: nearest t_f = "));
+    assert!(complaint(&["optimal", "--where", "t_f=7"]).contains("\n  help: the nearest rows have --where \"t_f="));
     assert!(complaint(&["optimal", "--where", "t_f>0"]).contains("help: --row 0, or a condition on t_f, v_i"));
     assert!(complaint(&["step_response", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
 }

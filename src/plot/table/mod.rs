@@ -19,7 +19,7 @@ use crate::model::{Friction, Units};
 
 use choice::Shape;
 pub use condition::Condition;
-use filtered::FilteredTable;
+pub(crate) use filtered::FilteredTable;
 
 /// The request.
 #[derive(Debug, Clone, Default)]
@@ -177,7 +177,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "step_response",
-        title: "Outcome of the step response",
+        title: "Step response",
         classes: &["outcome", "stick_slip"],
         value: &["v_peak", "cycle_peak", "outcome"],
         lines: &["v_peak", "v_trough", "settling_time", "period"],
