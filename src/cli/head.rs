@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use console::Term;
+
 #[cfg(feature = "query")]
 use super::query::unreadable;
 use super::{Failure, kind, no_table, say, summary, whole, words};
@@ -44,7 +46,8 @@ struct Head {
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
-    let texts: Vec<String> = heads(arguments)?.iter().map(|head| head.text(arguments)).collect();
+    let width = Term::stdout().size_checked().map(|(_, columns)| columns.into());
+    let texts: Vec<String> = heads(arguments)?.into_iter().map(|head| head.text(arguments, width)).collect();
     say(&texts.join("\n"))
 }
 
@@ -106,6 +109,30 @@ fn chosen(arguments: &Arguments, names: &[&str]) -> Result<Vec<usize>, Failure> 
     place.map(|place| vec![place]).ok_or_else(|| no_table(&format!("{}: ", arguments.dataset.display()), name, names))
 }
 
+/// Replaces the middle columns of `lines` by `…` if they are wider than `width` characters, and returns their number.
+fn hide_middle(lines: &mut [Vec<String>], width: usize) -> usize {
+    let count = lines.first().map_or(0, Vec::len);
+    let cell = |line: &Vec<String>, place: usize| line.get(place).map_or(0, |cell| cell.chars().count());
+    let widths: Vec<usize> =
+        (0..count).map(|place| 2 + lines.iter().map(|line| cell(line, place)).max().unwrap_or(0)).collect();
+    if widths.iter().sum::<usize>() <= width + 2 {
+        return 0;
+    }
+    // From both ends in turn, since the axes are first and the status is last. The mark takes one character.
+    let (mut room, mut first, mut last) = (width.saturating_sub(1), 0, count);
+    while first < last {
+        let is_first = first <= count - last;
+        let place = if is_first { first } else { last - 1 };
+        if widths[place] > room {
+            break;
+        }
+        room -= widths[place];
+        if is_first { first += 1 } else { last -= 1 }
+    }
+    lines.iter_mut().for_each(|line| _ = line.splice(first..last, ["…".to_owned()]));
+    last - first
+}
+
 impl Head {
     /// Whether the rows are all without a protocol, and others follow.
     fn are_empty(&self) -> bool {
@@ -116,8 +143,8 @@ impl Head {
         shown > 0 && self.rows.is_some_and(|rows| rows > shown) && words.all(|word| word == Status::Infeasible.name())
     }
 
-    /// A line on the table, then names, units and rows.
-    fn text(&self, arguments: &Arguments) -> String {
+    /// A line on the table, then names, units and rows, which a terminal shows in `width` characters.
+    fn text(mut self, arguments: &Arguments, width: Option<usize>) -> String {
         let mut text = self.name.clone();
         if let Some(rows) = self.rows {
             let meaning = table::find(&self.name).map(|table| format!("{}; ", table.doc())).unwrap_or_default();
@@ -127,14 +154,41 @@ impl Head {
             }
         }
         text.push('\n');
+        let are_empty = self.are_empty();
+        let hidden = width.map_or(0, |width| hide_middle(&mut self.lines, width.saturating_sub(2)));
         text.push_str(&words::aligned(&self.lines, 2));
-        if self.are_empty() {
-            let (path, name) = (arguments.dataset.display(), &self.name);
+        let (path, name) = (arguments.dataset.display(), &self.name);
+        if hidden > 0 {
+            let columns = words::things(hidden as u64, "more column");
+            text.push_str(&format!("  {columns}: slipsweep head {path} {name} | less -S\n"));
+        }
+        if are_empty {
             text.push_str(&format!(
                 "  the first rows with numbers: slipsweep query {path} \"SELECT * FROM {name} WHERE status = 'ok' LIMIT {}\"\n",
                 arguments.rows
             ));
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Wide tables on a terminal.
+
+    use super::*;
+
+    #[test]
+    fn the_middle_columns_are_hidden() {
+        let line = || ["t_f", "work", "gap", "v_min", "status"].map(str::to_owned).to_vec();
+        let shown = |width| {
+            let mut lines = vec![line()];
+            let hidden = hide_middle(&mut lines, width);
+            (hidden, words::aligned(&lines, 0))
+        };
+        assert_eq!(shown(29), (0, "t_f  work  gap  v_min  status\n".to_owned()));
+        assert_eq!(shown(28), (1, "t_f  work  …  v_min  status\n".to_owned()));
+        assert_eq!(shown(26), (2, "t_f  work  …  status\n".to_owned()));
+        assert_eq!(shown(1), (5, "…\n".to_owned()));
     }
 }
