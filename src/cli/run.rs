@@ -40,7 +40,7 @@ pub struct Arguments {
     #[arg(long)]
     requeue: bool,
     /// Print errors only
-    #[arg(long)]
+    #[arg(short, long)]
     quiet: bool,
     /// Fail with exit code 3 if any row is not_converged
     #[arg(long)]
@@ -87,13 +87,13 @@ fn solve(
     plan: &Plan,
     parts: &[Vec<Range<u64>>],
 ) -> Result<Outcome, Failure> {
-    let rows = plan.tables.iter().zip(parts).flat_map(|(table, parts)| {
+    let tables = plan.tables.iter().zip(parts).zip(&sweep.requests).map(|((table, parts), request)| {
         let parts = parts.iter().filter(|range| !range.is_empty());
-        parts.map(|range| table.rows_of(range.end - 1).end - table.rows_of(range.start).start)
+        let rows = parts.map(|range| table.rows_of(range.end - 1).end - table.rows_of(range.start).start);
+        (rows.fold(0_u64, u64::saturating_add), request.table.cost())
     });
-    let rows = rows.fold(0_u64, u64::saturating_add);
     let (signal, threads) = (Signal::default(), arguments.threads.map_or(0, usize::from));
-    let (done, caught) = watched(&signal, rows, arguments.quiet, || match arguments.shard {
+    let (done, caught) = watched(&signal, tables.collect(), arguments.quiet, || match arguments.shard {
         None => sweep::run(sweep, folder, threads, &signal),
         Some(shard) => sweep::run_shard(sweep, folder, shard, threads, &signal),
     });

@@ -22,12 +22,13 @@ const LINE_INTERVAL: Duration = Duration::from_secs(10);
 /// Time after which a terminal shows the progress. Chosen: a user should not wait longer than a second without a message.
 const PROGRESS_DELAY: Duration = Duration::from_secs(1);
 
-/// Runs `work`. Meanwhile it shows the progress towards `rows` rows unless `quiet`, and passes Ctrl-C and SIGTERM on to `signal`.
+/// Runs `work`. Meanwhile it shows the progress through `tables`, the rows of each and their mean cost, unless `quiet`, and passes Ctrl-C and SIGTERM
+/// on to `signal`.
 ///
 /// Returns the result of `work`, and the signal received, if any. A second signal ends the process at once, and so does a signal after the end
 /// of `work`.
-pub fn watched<T>(signal: &Signal, rows: u64, quiet: bool, work: impl FnOnce() -> T) -> (T, Option<i32>) {
-    let mut show = ProgressDisplay::new(rows, quiet);
+pub fn watched<T>(signal: &Signal, tables: Vec<(u64, u64)>, quiet: bool, work: impl FnOnce() -> T) -> (T, Option<i32>) {
+    let mut show = ProgressDisplay::new(tables, quiet);
     let look = |caught: Option<i32>| {
         if caught.is_some() {
             signal.stop();
@@ -172,6 +173,8 @@ fn set_style(bar: &ProgressBar, has_bar: bool) {
 
 /// The progress of a run: a bar on a terminal, else a line at intervals.
 struct ProgressDisplay {
+    /// The rows of each table, in the order of computation, and their mean cost.
+    tables: Vec<(u64, u64)>,
     /// All rows.
     rows: u64,
     quiet: bool,
@@ -185,10 +188,11 @@ struct ProgressDisplay {
 }
 
 impl ProgressDisplay {
-    fn new(rows: u64, quiet: bool) -> ProgressDisplay {
+    fn new(tables: Vec<(u64, u64)>, quiet: bool) -> ProgressDisplay {
+        let rows = tables.iter().fold(0_u64, |sum, (rows, _)| sum.saturating_add(*rows));
         let bar = (!quiet && stderr().is_terminal()).then(text_line);
         let now = Instant::now();
-        ProgressDisplay { rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
+        ProgressDisplay { tables, rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
     }
 
     fn update(&mut self, signal: &Signal) {
@@ -221,6 +225,16 @@ impl ProgressDisplay {
         }
     }
 
+    /// The cost of the first `rows` rows.
+    fn cost(&self, mut rows: u64) -> f64 {
+        let costs = self.tables.iter().map(|&(all, cost)| {
+            let first = rows.min(all);
+            rows -= first;
+            first as f64 * cost as f64
+        });
+        costs.sum()
+    }
+
     fn text(&self, signal: &Signal) -> String {
         let (done, kept) = (signal.rows(), signal.kept());
         match self.phase {
@@ -229,10 +243,15 @@ impl ProgressDisplay {
                 format!("checking existing parts: {kept} of {all}")
             }
             Phase::Computing => {
-                let rate = done as f64 / self.since.elapsed().as_secs_f64().max(POLL_INTERVAL.as_secs_f64());
-                let to_do = self.rows.saturating_sub(done + kept);
-                let left = if done == 0 { "?".to_owned() } else { words::duration(to_do as f64 / rate) };
-                format!("{} per second, {left} left", words::count(rate as u64))
+                let seconds = self.since.elapsed().as_secs_f64().max(POLL_INTERVAL.as_secs_f64());
+                let mut text = format!("{} per second", words::count((done as f64 / seconds) as u64));
+                let [before, now, all] = [kept, kept + done, self.rows].map(|rows| self.cost(rows));
+                // The first rows do not determine the rest.
+                if now > before && self.since.elapsed() > PROGRESS_DELAY {
+                    let left = seconds * (all - now) / (now - before);
+                    text.push_str(&format!(", about {} left", words::duration(left)));
+                }
+                text
             }
             Phase::Writing => "writing the last parts".to_owned(),
         }
