@@ -195,8 +195,8 @@ impl Arguments {
         let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
         let encode = || place.format.encode(&figure.draw(width).svg, self.dpi);
         let bytes = waiting("writing the picture", encode)?;
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(|error| cannot_write(&path, &error))?;
+        if !place.is_file {
+            fs::create_dir_all(&place.path).map_err(|error| cannot_write(&path, &error))?;
         }
         write_file(&path, &bytes)?;
         Ok(path)

@@ -221,7 +221,8 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
     for (path, kind, help) in [
         ("tiny.toml", "a spec, not a dataset", "`slipsweep run tiny.toml` computes"),
         ("best.csv", "a trace, not a dataset", "`slipsweep plot best.csv` draws it"),
-        ("results/none", "there is no such file or folder", "check the name"),
+        ("results/none", "there is no such file or folder", "check the path"),
+        ("results/tint", "there is no such file or folder", "did you mean `results/tiny`?"),
         ("results/tiny", "a dataset without a table", "slipsweep trace results/tiny optimal --row 0"),
     ] {
         let said = complaint(folder, &["trace", path]);
@@ -242,6 +243,12 @@ fn all_tables_go_into_a_folder_in_a_format() {
                 [tables.optimal]\n[tables.best_cubic]\n";
     fs::write(folder.join("tiny.toml"), spec).expect("is writable");
     shown(folder, &["run", "tiny.toml", "--quiet"]);
+    // A file needs an existing folder, as in other commands.
+    let output = command(folder, &["plot", "results/tiny", "--table", "optimal", "--out", "new/picture.svg"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8(output.stderr).expect("is text");
+    assert!(said.ends_with("\n  help: make its folder first, or name an existing one\n"), "{said}");
+    assert!(!folder.join("new").exists());
     let said = shown(folder, &["plot", "results/tiny", "--format", "png", "--out", "new/pictures", "--dpi", "60"]);
     let path = |table: &str| format!("new/pictures/tiny-{table}.png");
     assert_eq!(said, ["optimal", "best_cubic"].map(|table| format!("{table}: written to {}\n", path(table))).concat());
