@@ -203,14 +203,12 @@ fn rows(is_trace: bool) -> Kind {
 /// Whether a CSV has columns of time and velocity, after its comment lines.
 fn is_trace(text: &str) -> bool {
     let names = text.lines().find(|line| !line.starts_with('#')).unwrap_or_default();
-    let has = |name| names.split(',').any(|column| column.trim() == name);
-    has("t") && has("v")
+    ["t", "v"].iter().all(|name| names.split(',').any(|column| column.trim() == *name))
 }
 
 fn has_columns_of_trace(path: &Path) -> bool {
     let names = crate::dataset::frame::headings(path).map(|(headings, _)| headings).unwrap_or_default();
-    let has = |name| names.iter().any(|heading| heading.name == name);
-    has("t") && has("v")
+    ["t", "v"].iter().all(|name| names.iter().any(|heading| heading.name == *name))
 }
 
 /// Whether a text is a spec although the name of its file does not end like one.

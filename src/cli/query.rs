@@ -303,7 +303,7 @@ fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<(), Answ
 /// Writes aligned columns under their names and, if known, their units.
 fn table(answer: Answer, out: &mut dyn Write) -> Result<(), AnswerError> {
     let mut columns = words::Columns::default();
-    let mut lines = words::headed(answer.columns(), answer.units(), Vec::new());
+    let mut lines = words::headed(answer.columns.clone(), answer.units.clone(), Vec::new());
     answer.rows(|rows| {
         lines.extend(rows.iter().map(|row| row.iter().map(summary::shown).collect()));
         out.write_all(columns.lines(&lines, 0).as_bytes())?;

@@ -30,9 +30,10 @@ const MAX_PARTIAL_ROWS: usize = 1 << 22;
 
 /// An answer, computed while it is read.
 pub struct Answer {
-    pub(super) columns: Vec<String>,
-    /// One for each column.
-    pub(super) units: Vec<String>,
+    /// The names of its columns.
+    pub columns: Vec<String>,
+    /// The units of its columns; empty if unknown.
+    pub units: Vec<String>,
     pub(super) frame: LazyFrame,
     /// Its computation part by part, if possible.
     pub(super) streaming: Option<StreamPlan>,
@@ -78,16 +79,6 @@ impl From<ParquetError> for AnswerError {
 type BatchHandler<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
-    /// The names of its columns.
-    pub fn columns(&self) -> Vec<String> {
-        self.columns.clone()
-    }
-
-    /// The units of its columns; empty if unknown.
-    pub fn units(&self) -> Vec<String> {
-        self.units.clone()
-    }
-
     /// Passes its rows to `take`, some thousands at a time.
     ///
     /// # Errors
