@@ -150,7 +150,14 @@ impl Cubic {
     pub fn work(&self) -> Option<f64> {
         let half = |from_end: bool| {
             let power = |at: Place| self.t_f * self.velocity(at) * self.friction(at);
-            integrate(|y: &[f64; 2]| [power((from_end, y[1])), 1.0], [0.0, 0.0], (0.0, 0.5)).map(|y| y[0])
+            let part = |from: f64, to: f64| {
+                integrate(|y: &[f64; 2]| [power((from_end, y[1])), 1.0], [0.0, from], (from, to)).map(|y| y[0])
+            };
+            // Under the slip law the velocity has a kink where theta rises as fast as it can.
+            let [_, _, c_2, c_3] = self.theta[usize::from(from_end)];
+            let fastest = (-c_2 / (3.0 * c_3)).clamp(0.0, 0.5);
+            let cut = if fastest.is_nan() { 0.5 } else { fastest };
+            Some(part(0.0, cut)? + part(cut, 0.5)?)
         };
         Some(half(false)? + half(true)?)
     }

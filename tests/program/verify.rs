@@ -91,6 +91,16 @@ fn landscapes_of_other_laws_are_verified() {
 }
 
 #[test]
+fn regress_a_kink_of_the_velocity_raises_no_alarm() {
+    let axes = "law = \"slip\"\nv_ceiling = 100.0\nt_f = 1.2\na = 0.03\nb = 0.02\nv_i = 4.0\nv_f = 2.5\n";
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), axes, "[tables.best_cubic]\n"), folder.path(), 2);
+    let output = verify(folder.path(), &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert!(has_rows(&output, "best_cubic", "1"), "{}", text(&output));
+}
+
+#[test]
 fn best_cubic_shortcuts_of_other_laws_are_verified() {
     let tables = "[tables.best_cubic]\n";
     let folder = tempfile::tempdir().expect("is writable");
