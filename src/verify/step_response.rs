@@ -220,7 +220,9 @@ impl LastCycle {
         let apart = match () {
             () if last < rtol => last,
             // The further changes of an approach are a geometric series.
-            () if last < before => last * last / (before - last),
+            () if last < before && (second.top < first.top) == (third.top < second.top) => {
+                last * last / (before - last)
+            }
             // An oscillation that still grows.
             () => f64::INFINITY,
         };
