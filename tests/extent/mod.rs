@@ -1,4 +1,4 @@
-//! How much the tests try: what a person waits for, or everything with `SLIPSWEEP_TESTS=long`, as `.ci/run` does.
+//! How much the tests try: what a person waits for, or everything with `SLIPSWEEP_TESTS=long`, as `tests/nightly/run` does.
 
 use std::env::{self, VarError};
 
