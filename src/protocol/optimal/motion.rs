@@ -347,8 +347,8 @@ impl Timed {
     pub fn time(&self, place: f64) -> f64 {
         let piece = ((place * f64::from(self.pieces.count)) as usize).min(self.pieces.count as usize - 1);
         let [from, to] = self.pieces.edges_of(piece);
-        // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next.
-        if self.gone[piece + 1] <= self.left[piece] {
+        // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next, or miss the end.
+        if self.gone[piece + 1] <= self.left[piece] && place < 1.0 {
             let gone = (self.gone[piece] + self.pieces.time(from, place)).min(self.gone[piece + 1]);
             (self.start + self.scale * gone).min(self.middle).max(self.start)
         } else {
