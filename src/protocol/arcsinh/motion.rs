@@ -13,31 +13,41 @@ pub(super) struct ExtremalMotion {
     t_f: f64,
     /// Sums of the whole: near a turn and at rest those of an interval have few digits.
     whole: Sums,
-    /// Time at the start of each interval.
-    starts: Vec<f64>,
+    /// Times from the start to the edges of the intervals, and from the edges to the end.
+    gone: Vec<f64>,
+    left: Vec<f64>,
+    /// When the intervals begin whose times count from the end.
+    middle: f64,
 }
 
 impl ExtremalMotion {
     /// The motion of duration `t_f`; `None` if the extremal does not exist throughout.
     pub fn new(extremal: Extremal, t_f: f64, stats: &mut SolverStats) -> Option<ExtremalMotion> {
         let whole = extremal.sums(&Sums::default(), stats)?;
-        let mut starts = vec![0.0];
-        for interval in 0..INTERVALS - 1 {
+        let (mut gone, mut left) = (vec![0.0], vec![0.0]);
+        for interval in 0..INTERVALS {
             let time = extremal.part([interval, interval + 1].map(place)).sums(&whole, stats)?.time;
-            starts.push(starts[starts.len() - 1] + time);
+            gone.push(gone[gone.len() - 1] + time);
+            left.iter_mut().for_each(|left| *left += time);
+            left.push(0.0);
         }
-        Some(ExtremalMotion { extremal, t_f, whole, starts })
+        let nearer_end = gone.iter().skip(1).zip(&left).find(|(gone, left)| gone > left);
+        let middle = t_f - nearer_end.map_or(0.0, |(_, &left)| left);
+        Some(ExtremalMotion { extremal, t_f, whole, gone, left, middle })
     }
 
-    /// Time at `s`.
+    /// Time at `s`: from the nearer end, so that the layers at both ends keep their digits.
     fn time(&self, s: f64) -> Option<f64> {
         let interval = ((s * f64::from(INTERVALS)) as u32).min(INTERVALS - 1);
-        let from = place(interval);
-        if s <= from {
-            return self.starts.get(interval as usize).copied();
+        let [from, to] = [interval, interval + 1].map(place);
+        let (first, next) = (interval as usize, interval as usize + 1);
+        let time = |part| Some(self.extremal.part(part).sums(&self.whole, &mut SolverStats::default())?.time);
+        if self.gone[next] <= self.left[first] {
+            let since = if s <= from { 0.0 } else { time([from, s])? };
+            Some((self.gone[first] + since).min(self.gone[next]).min(self.middle))
+        } else {
+            Some((self.t_f - (self.left[next] + time([s, to])?).min(self.left[first])).max(self.middle))
         }
-        let time = self.extremal.part([from, s]).sums(&self.whole, &mut SolverStats::default())?.time;
-        Some((self.starts.get(interval as usize)? + time).min(self.t_f))
     }
 }
 
