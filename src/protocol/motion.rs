@@ -31,6 +31,67 @@ pub(crate) fn interval_at(s: f64, count: usize) -> (usize, f64) {
     (k, along - k as f64)
 }
 
+/// Times along consecutive pieces, counted from the nearer end: the layers at both ends keep their digits.
+pub(super) struct PieceTimes {
+    /// Time from the start to the start of each piece, and to the end.
+    pub gone: Vec<f64>,
+    /// Time from the start of each piece to the end, and 0.
+    pub left: Vec<f64>,
+    /// When they begin and end.
+    pub start: f64,
+    pub end: f64,
+    /// The factor that makes the times of the pieces add up.
+    scale: f64,
+    /// When the pieces begin whose times count from the end.
+    middle: f64,
+}
+
+impl PieceTimes {
+    /// Pieces that take these times, from the time 0 on.
+    pub fn new(times: &[f64]) -> PieceTimes {
+        let sums = |times: &mut dyn Iterator<Item = &f64>| {
+            let mut sums = vec![0.0];
+            sums.extend(times.scan(0.0, |sum, time| {
+                *sum += time;
+                Some(*sum)
+            }));
+            sums
+        };
+        let gone = sums(&mut times.iter());
+        let mut left = sums(&mut times.iter().rev());
+        left.reverse();
+        let end = left[0];
+        let mut all = PieceTimes { gone, left, start: 0.0, end, scale: 1.0, middle: 0.0 };
+        all.set(0.0, end);
+        all
+    }
+
+    /// Moves the pieces to the time from `start` to `end`.
+    pub fn set(&mut self, start: f64, end: f64) {
+        let nearer_end = self.gone.iter().skip(1).zip(&self.left).find(|(gone, left)| gone > left);
+        self.scale = (end - start) / self.left[0];
+        self.middle = end - self.scale * nearer_end.map_or(0.0, |(_, &left)| left);
+        (self.start, self.end) = (start, end);
+    }
+
+    /// Whether the times of a piece count from the start.
+    pub fn is_nearer_start(&self, piece: usize) -> bool {
+        self.gone[piece + 1] <= self.left[piece]
+    }
+
+    /// The time in a piece, `part` after its start or, if its times count from the end, before its end.
+    pub fn at(&self, piece: usize, part: f64) -> f64 {
+        // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next.
+        if self.is_nearer_start(piece) {
+            let gone = (self.gone[piece] + part).min(self.gone[piece + 1]);
+            (self.start + self.scale * gone).min(self.middle).max(self.start)
+        } else {
+            let left = (self.left[piece + 1] + part).min(self.left[piece]);
+            (self.end - self.scale * left).max(self.middle).min(self.end)
+        }
+    }
+}
+
 /// A protocol as a curve over a parameter `s` from 0 to 1, along which time never falls.
 ///
 /// The parameter stretches layers that are thin in time. `at(0.0)` is just after the jump at the start, `at(1.0)` just

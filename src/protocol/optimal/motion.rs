@@ -11,6 +11,7 @@ use super::search::ROUNDING;
 use super::slopes::costate_off_bounds;
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::protocol::motion::PieceTimes;
 use crate::protocol::{Moment, Motion};
 
 /// The motion along one path.
@@ -108,7 +109,7 @@ impl Segment {
     fn duration(&self) -> f64 {
         match self {
             Segment::Floor(floor) => floor.time,
-            Segment::Free(arc) => arc.left[0],
+            Segment::Free(arc) => arc.times.left[0],
             Segment::Ceiling(timed) => timed.arc.time(),
             Segment::Sitting(sitting) => sitting.time,
         }
@@ -116,7 +117,7 @@ impl Segment {
 
     fn set_times(&mut self, start: f64, end: f64) {
         match self {
-            Segment::Free(arc) => arc.set_times(start, end),
+            Segment::Free(arc) => arc.times.set(start, end),
             Segment::Ceiling(timed) => (timed.start, timed.end) = (start, end),
             Segment::Floor(_) | Segment::Sitting(_) => {}
         }
@@ -299,17 +300,7 @@ pub(super) struct Timed {
     pub pieces: EqualSteps,
     /// The conserved `C`.
     pub c: f64,
-    /// When it begins and ends.
-    pub start: f64,
-    end: f64,
-    /// Time from the start of the arc to the start of each piece, and to the end.
-    pub gone: Vec<f64>,
-    /// Time from the start of each piece to the end of the arc, and 0.
-    pub left: Vec<f64>,
-    /// The factor that makes the times of the steps add up.
-    scale: f64,
-    /// When the pieces begin whose times count from the end.
-    middle: f64,
+    pub times: PieceTimes,
 }
 
 impl Timed {
@@ -317,43 +308,17 @@ impl Timed {
     pub fn new(arc: &Arc) -> Timed {
         let pieces = arc.pieces();
         let times: Vec<f64> = pieces.edges().map(|[from, to]| pieces.time(from, to)).collect();
-        let sums = |times: &mut dyn Iterator<Item = &f64>| {
-            let mut sum = 0.0;
-            let mut sums = vec![0.0];
-            for time in times {
-                sum += time;
-                sums.push(sum);
-            }
-            sums
-        };
-        let gone = sums(&mut times.iter());
-        let mut left = sums(&mut times.iter().rev());
-        left.reverse();
-        let mut timed = Timed { pieces, c: arc.c(), start: 0.0, end: 0.0, gone, left, scale: 1.0, middle: 0.0 };
-        timed.set_times(0.0, timed.left[0]);
-        timed
+        Timed { pieces, c: arc.c(), times: PieceTimes::new(&times) }
     }
 
-    /// Moves the arc to the time from `start` to `end`.
-    pub fn set_times(&mut self, start: f64, end: f64) {
-        let nearer_end = self.gone.iter().skip(1).zip(&self.left).find(|(gone, left)| gone > left);
-        self.scale = (end - start) / self.left[0];
-        self.middle = end - self.scale * nearer_end.map_or(0.0, |(_, &left)| left);
-        (self.start, self.end) = (start, end);
-    }
-
-    /// Time since the start of the protocol: from the nearer end of the arc, so that the layers at both ends keep their
-    /// digits.
+    /// Time since the start of the protocol.
     pub fn time(&self, place: f64) -> f64 {
+        if place >= 1.0 {
+            return self.times.end;
+        }
         let piece = ((place * f64::from(self.pieces.count)) as usize).min(self.pieces.count as usize - 1);
         let [from, to] = self.pieces.edges_of(piece);
-        // Rounding must not let the time run backwards where one piece or one way of counting gives way to the next, or miss the end.
-        if self.gone[piece + 1] <= self.left[piece] && place < 1.0 {
-            let gone = (self.gone[piece] + self.pieces.time(from, place)).min(self.gone[piece + 1]);
-            (self.start + self.scale * gone).min(self.middle).max(self.start)
-        } else {
-            let left = (self.left[piece + 1] + self.pieces.time(place, to)).min(self.left[piece]);
-            (self.end - self.scale * left).max(self.middle).min(self.end)
-        }
+        let [from, to] = if self.times.is_nearer_start(piece) { [from, place] } else { [place, to] };
+        self.times.at(piece, self.pieces.time(from, to))
     }
 }

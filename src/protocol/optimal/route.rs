@@ -47,11 +47,11 @@ impl Route {
         let arc = extremal.map(|found| {
             let mut arc = Timed::new(&found.arc);
             // Rounding of the search goes to the floor arc, if there is one.
-            let start = if found.time_at_floor > 0.0 { (t_f - arc.left[0]).max(0.0) } else { 0.0 };
-            arc.set_times(start, t_f);
+            let start = if found.time_at_floor > 0.0 { (t_f - arc.times.left[0]).max(0.0) } else { 0.0 };
+            arc.times.set(start, t_f);
             arc
         });
-        let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.start));
+        let floor = Floor::new(problem, theta_s, arc.as_ref().map_or(t_f, |arc| arc.times.start));
         Route { t_f, floor, arc }
     }
 
@@ -62,7 +62,7 @@ impl Route {
 
     /// When the floor arc ends and the free arc begins; `None` if there is only one of them.
     pub fn corner(&self) -> Option<f64> {
-        self.arc.as_ref().map(|arc| arc.start).filter(|&start| start > 0.0)
+        self.arc.as_ref().map(|arc| arc.times.start).filter(|&start| start > 0.0)
     }
 
     /// The place just after the start.
@@ -78,7 +78,7 @@ impl Route {
     /// The place at a time after the start.
     pub fn after(&self, time: f64) -> PathPoint {
         match &self.arc {
-            Some(arc) if time >= arc.start => PathPoint::Moving(arc.place_after(time - arc.start)),
+            Some(arc) if time >= arc.times.start => PathPoint::Moving(arc.place_after(time - arc.times.start)),
             _ => PathPoint::Held(time),
         }
     }
@@ -86,7 +86,7 @@ impl Route {
     /// The place at a time before the end.
     pub fn before(&self, time: f64) -> PathPoint {
         match &self.arc {
-            Some(arc) if time <= arc.left[0] => PathPoint::Moving(arc.place_before(time)),
+            Some(arc) if time <= arc.times.left[0] => PathPoint::Moving(arc.place_before(time)),
             _ => PathPoint::Held(self.t_f - time),
         }
     }
@@ -242,16 +242,16 @@ impl Timed {
 
     /// The place at a time after the start of the arc.
     fn place_after(&self, time: f64) -> f64 {
-        let piece = self.gone.partition_point(|&gone| gone <= time).clamp(1, self.gone.len() - 1) - 1;
+        let piece = self.times.gone.partition_point(|&gone| gone <= time).clamp(1, self.times.gone.len() - 1) - 1;
         let [from, to] = self.pieces.edges_of(piece);
-        from + inverse(time - self.gone[piece], to - from, |d| self.pieces.time(from, from + d))
+        from + inverse(time - self.times.gone[piece], to - from, |d| self.pieces.time(from, from + d))
     }
 
     /// The place at a time before the end of the arc.
     fn place_before(&self, time: f64) -> f64 {
-        let piece = self.left.partition_point(|&left| left > time).clamp(1, self.left.len() - 1) - 1;
+        let piece = self.times.left.partition_point(|&left| left > time).clamp(1, self.times.left.len() - 1) - 1;
         let [from, to] = self.pieces.edges_of(piece);
-        to - inverse(time - self.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
+        to - inverse(time - self.times.left[piece + 1], to - from, |d| self.pieces.time(to - d, to))
     }
 }
 
