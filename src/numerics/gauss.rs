@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
 
-/// Nodes of a panel that its integrand's singularities leave far away. Chosen: two vectors of eight.
+/// Nodes of a panel with distant singularities. Chosen: two vectors of eight; the lengths of panels state the error.
 pub const SHORT_NODES: usize = 16;
 
 /// Nodes of the largest rule. Chosen: twice those of the largest panel of a landscape.

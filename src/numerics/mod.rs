@@ -16,7 +16,7 @@ pub mod stiff;
 pub mod turning;
 pub mod wright;
 
-/// Steps of an iteration, at most: only rounding takes as many. Chosen: a bisection of any bracket of doubles takes fewer.
+/// Steps of an iteration, at most. Chosen: a bisection down to the rounding of its bracket takes 53.
 pub const MAX_STEPS: u32 = 200;
 
 /// Panels of a quadrature, at most. Chosen: 0.1 s; the hardest cases take some hundreds.
@@ -31,11 +31,11 @@ pub const LONG_ROUNDING_RTOL: f64 = 1e-12;
 /// `-ln` of a factor that rounding hides. Derived: that of the rounding, 37, and a margin of `e^8`.
 pub const NEGLIGIBLE_LN: f64 = 45.0;
 
-/// Exponent, at most, whose exponential and its inverse are numbers. Derived: doubles overflow at 709.
-pub const MAX_EXPONENT: f64 = 700.0;
+/// Greatest absolute logarithm of a number. Derived: doubles overflow beyond 709.
+pub const MAX_LN: f64 = 700.0;
 
-/// Size that stands for an infinite one. Derived: its square is a number, and that of its inverse.
-pub const HUGE: f64 = 1e100;
+/// Size that stands for an infinite one. Derived: its square and the square of its inverse are numbers.
+pub const MAX_SQUARABLE: f64 = 1e100;
 
-/// Least size that counts as a number; its inverse is one, too. Derived: doubles have fewer digits below 2.2e-308.
-pub const LEAST: f64 = 1e-300;
+/// Least size above 0. Derived: it and its inverse have all digits, which doubles below 2.2e-308 lack.
+pub const MIN_INVERTIBLE: f64 = 1e-300;

@@ -1,4 +1,5 @@
 //! All real roots of a polynomial on an interval, each bracketed between roots of its derivative.
+
 use super::MAX_STEPS;
 
 /// The value of `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope.

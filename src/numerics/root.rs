@@ -1,4 +1,5 @@
 //! A bracketed root finder that always terminates: Newton's method inside a shrinking bracket.
+
 use super::MAX_STEPS;
 
 /// The value and the slope of a function at one point.

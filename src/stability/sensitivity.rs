@@ -11,9 +11,9 @@
 //! `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps fast modes and
 //! resolves slow ones.
 
-use crate::numerics::LEAST;
 use nalgebra::{DMatrix, DVectorView, Matrix3};
 
+use crate::numerics::MIN_INVERTIBLE;
 use crate::numerics::elementary::exp;
 use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
 use crate::protocol::compliant::{self, CompliantPath};
@@ -78,7 +78,7 @@ fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> 
                 h = (to - from) * duration * change.clamp(0.2, 0.8);
             } else {
                 flow = next;
-                if flow.amax() < LEAST {
+                if flow.amax() < MIN_INVERTIBLE {
                     return Some(0.0);
                 }
                 h = ((to - from) * duration * change.clamp(0.5, 4.0)).max(if to == 1.0 { h } else { 0.0 });

@@ -6,7 +6,7 @@
 
 use crate::model::Law;
 use crate::model::arcsinh::{LOG_LEVEL, friction_rise, reduction, scaled_friction, steady_level};
-use crate::numerics::LEAST;
+use crate::numerics::MIN_INVERTIBLE;
 use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
@@ -177,7 +177,7 @@ impl Point {
     /// The velocity; 0 below the normal numbers.
     pub fn velocity(&self) -> f64 {
         let v = exp(self.ln_u) / self.theta;
-        if v < LEAST { 0.0 } else { v }
+        if v < MIN_INVERTIBLE { 0.0 } else { v }
     }
 
     /// Friction.

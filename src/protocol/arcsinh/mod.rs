@@ -13,7 +13,7 @@ use crate::model::arcsinh::{reduction, scaled_friction, steady_level};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, crossing};
-use crate::numerics::{LONG_ROUNDING_RTOL, MAX_EXPONENT};
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_LN};
 use extremal::{Extremal, Point, Sums};
 
 /// The optimum and the derivatives of its work.
@@ -132,7 +132,7 @@ impl Problem {
         };
         // Theta rises by the rate 1 at most.
         let mut bracket = [0.0, ln_1p(target * greater).sqrt()];
-        let mut values = [if self.ratio > 0.0 { value(0.0) } else { -MAX_EXPONENT }, value(bracket[1])];
+        let mut values = [if self.ratio > 0.0 { value(0.0) } else { -MAX_LN }, value(bracket[1])];
         let mut step = 0.25;
         while values[0] > 0.0 && step < MAX_STEP {
             bracket = [bracket[0] - step, bracket[0]];

@@ -8,6 +8,7 @@ use crate::protocol::cubic::WorkDerivatives;
 /// Gain of the last step, relative to the work, times `a` where that is small: such a step changes velocities by a fraction of
 /// 1e-11, and the next one would change them by the square of that. Derived: the gain is of second order.
 const LAST_STEP_GAIN: f64 = 1e-22;
+
 /// A step of Newton's method.
 struct Newton {
     step: [f64; 2],

@@ -4,7 +4,6 @@
 //! a line. Then the ends of a shortcut and the coefficients in Bernstein's form decide most shortcuts; stationary points are computed only for
 //! undecided lanes. A result never depends on neighbouring shortcuts; only the time does.
 
-use crate::numerics::{HUGE, MAX_STEPS};
 use multiversion::multiversion;
 
 use super::friction::FrictionBounds;
@@ -14,6 +13,7 @@ use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::real::Real;
 use crate::numerics::root::LAST_STEP_RESIDUAL;
+use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
 use crate::protocol::Status;
 
 /// Spans that are tested together, with two ends each.
@@ -117,7 +117,7 @@ fn verdicts(ends: &Ends, floors: &FrictionBounds, a_2: &Lanes, a_3: &Lanes) -> [
     let mut found = [None; BATCH_SPANS];
     for (i, found) in found.iter_mut().enumerate() {
         let j = i + BATCH_SPANS;
-        let tame = (a_2[i].abs() + a_3[i].abs() < HUGE) & (a_2[j].abs() + a_3[j].abs() < HUGE);
+        let tame = (a_2[i].abs() + a_3[i].abs() < MAX_SQUARABLE) & (a_2[j].abs() + a_3[j].abs() < MAX_SQUARABLE);
         let [n, theta, surplus] = [0, 1, 2].map(|k| positive[k][i] & positive[k][j]);
         let [no_n, no_theta, no_surplus] = [0, 1, 2].map(|k| negative[k][i] | negative[k][j]);
         let sound = high[0][i] & high[0][j] & high[1][i] & high[1][j];
@@ -180,7 +180,7 @@ fn signs(ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Option<[Lanes; 3]> {
         let (quadratic, doubt) = polynomial(ends, a_2[i], a_3[i], 0);
         let sign = sign_of_quadratic(&quadratic, doubt);
         // No greater coefficients are feasible: `n >= 0` has the mean `t_f - rise`, so its ends are at most nine times that.
-        let tame = a_2[i].abs() + a_3[i].abs() < HUGE;
+        let tame = a_2[i].abs() + a_3[i].abs() < MAX_SQUARABLE;
         n[i] = if tame { sign } else { -1.0 };
     }
     if n.iter().all(|&n| n < 0.0) {

@@ -10,10 +10,10 @@
 //! - the **direct chart** `y = ln(theta/theta_a)` is for arcs that stay a factor of two below their turning point, or
 //!   have none.
 
-use crate::numerics::HUGE;
 use multiversion::multiversion;
 
 use crate::model::Law;
+use crate::numerics::MAX_SQUARABLE;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, polynomial, rough_ln};
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes, fold, least};
@@ -548,7 +548,7 @@ fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
     for _ in 0..ROUNDS {
         let (force, side) = ((friction_a - bend * r).max(0.0), shift + bend * s);
         let size = (force * force + side * side).sqrt();
-        r = rough_ln((inverse * size).clamp(1.0 / HUGE, HUGE));
+        r = rough_ln((inverse * size).clamp(1.0 / MAX_SQUARABLE, MAX_SQUARABLE));
         // Shafer's bound of the arcus tangens from below.
         s = if side > 0.0 { FRAC_PI_2 + 3.0 * force / (side + 2.0 * size) } else { PI };
     }

@@ -3,12 +3,12 @@
 //! Both ceilings bound `z = ln u`: at `theta = theta_1 e^y` the velocity allows `z_v + y` and friction `z_tau + kappa y`,
 //! `kappa = 1 - b/a` (docs/derivations.md, "Ceilings").
 
-use crate::numerics::NEGLIGIBLE_LN;
 use multiversion::multiversion;
 
 use super::clamp::{Depth, Gap};
 use super::{ArcKind, Bounds};
 use crate::model::{Law, friction_margin};
+use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_and_m1, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, fold};
@@ -365,17 +365,17 @@ impl CeilingLine {
         let (mut from, mut to, mut start) = (0.0, 0.0, 0.0);
         // An arc that is short compared with its distance from u = 1 has its digits in s alone.
         let ln_z = arc.least_ln_z();
-        if ln_z < STEADY_LN_Z || ln_z < ln(0.5 * near) && slope * self.length > PANEL * least {
+        if ln_z < STEADY_LN_Z || ln_z < ln(0.5 * near) && slope * self.length > MAX_PANEL * least {
             let greatest = (least + slope * self.length).min(near);
             (from, to) = (ln_z.max(STEADY_LN_Z), ln(greatest).max(STEADY_LN_Z));
             start = (greatest - least) / slope;
         }
-        let longest = PANEL * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
+        let longest = MAX_PANEL * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
         // What is this much farther from u = 1 takes no time, where theta falls on the way there.
         let falls = self.high_first && self.sign > 0.0;
         let end = if falls { self.length.min(start + NEGLIGIBLE_LN / slope) } else { self.length };
         [
-            CeilingChart { near: true, from, to, longest: PANEL },
+            CeilingChart { near: true, from, to, longest: MAX_PANEL },
             CeilingChart { near: false, from: start, to: end.max(start), longest },
         ]
     }
@@ -473,5 +473,6 @@ impl CeilingChart {
 /// `ln |z|` below which `theta` and `z/(e^z - 1)` no longer change. Derived: `e^-42` is 6e-19, below the rounding of a double.
 pub(super) const STEADY_LN_Z: f64 = -42.0;
 
-/// Longest panel in `ln theta`, in units of the distance from `u = 1` and of the change of `z` by 1. Derived: `3^-32` is left.
-const PANEL: f64 = 3.0;
+/// Longest panel: near `u = 1` in `ln |z|`, else in `ln theta` in units of the distance from `u = 1` and of the change of `z` by 1. Derived:
+/// the singularities leave `4^-32` (at `ln 2 pi + pi i/2`) and `3^-32`.
+const MAX_PANEL: f64 = 3.0;

@@ -3,7 +3,6 @@
 //! Where theta falls the optimum is `z = ln u = min(z_free, z_cap)`. It is on a ceiling where `G = a [phi(z_cap) - E]` is
 //! negative, so the pieces end at the zeros of `G`, which has one stationary point at most, and where the ceilings cross.
 
-use crate::numerics::MAX_STEPS;
 use std::cell::Cell;
 
 use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
@@ -12,6 +11,7 @@ use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use super::{ArcKind, floor};
 use crate::model::Law;
+use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 
 /// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.

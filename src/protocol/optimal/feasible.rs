@@ -6,7 +6,7 @@ use super::extremal::Problem;
 use super::{ArcKind, Bounds, Obstacle, posed};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, ln};
-use crate::numerics::{LEAST, MAX_EXPONENT};
+use crate::numerics::{MAX_LN, MIN_INVERTIBLE};
 
 /// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
 /// infinite unless a ceiling keeps theta from rising. `None` where no time is feasible.
@@ -111,16 +111,16 @@ fn root(
 ) -> f64 {
     // Above 0 where the ceiling allows `t_f`.
     let room = |place: f64| match feasible(problem, &at(place).1) {
-        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(LEAST, 1.0 / LEAST) / t_f),
-        Feasible::Times(_, most) => ln(most.clamp(LEAST, 1.0 / LEAST) / t_f),
-        Feasible::Sitting(_) => ln(1.0 / LEAST),
-        Feasible::Never(_) => ln(LEAST),
+        Feasible::Times(least, _) if !problem.rises() => -ln(least.clamp(MIN_INVERTIBLE, 1.0 / MIN_INVERTIBLE) / t_f),
+        Feasible::Times(_, most) => ln(most.clamp(MIN_INVERTIBLE, 1.0 / MIN_INVERTIBLE) / t_f),
+        Feasible::Sitting(_) => ln(1.0 / MIN_INVERTIBLE),
+        Feasible::Never(_) => ln(MIN_INVERTIBLE),
     };
     let mut low = (start, room(start));
     let mut high = low;
     let first = step;
     while high.1 < 0.0 {
-        if high.0 > MAX_EXPONENT {
+        if high.0 > MAX_LN {
             return at(high.0).0;
         }
         low = high;
@@ -129,7 +129,7 @@ fn root(
     }
     step = first;
     while low.1 >= 0.0 {
-        if low.0 < -MAX_EXPONENT {
+        if low.0 < -MAX_LN {
             return at(low.0).0;
         }
         high = low;

@@ -1,12 +1,12 @@
 //! A first parameter for the search.
 
-use crate::numerics::MAX_EXPONENT;
 use multiversion::multiversion;
 
 use super::arc::phi;
 use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
+use crate::numerics::MAX_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes};
@@ -64,7 +64,7 @@ fn ceilings_at(ceilings: &Ceilings, arcs: &Falling, x: &[f64; SHORT_NODES]) -> [
     let mut caps = [0.0; SHORT_NODES];
     for (cap, x) in caps.iter_mut().zip(x) {
         let s = 0.5 * (1.0 + x);
-        *cap = exp_m1(ceilings.cap(arcs.depth * (1.0 - s * s * s)).min(MAX_EXPONENT));
+        *cap = exp_m1(ceilings.cap(arcs.depth * (1.0 - s * s * s)).min(MAX_LN));
     }
     caps
 }
@@ -162,11 +162,11 @@ impl Falling {
             }
             sum += over / under;
         }
-        (times[from] < MAX_EXPONENT).then_some(sum)
+        (times[from] < MAX_LN).then_some(sum)
     }
 }
 
-/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MAX_EXPONENT`] where there is no arc. Under
+/// Logarithms of the times of eight arcs with these `ln u(0+)`, to about 1e-4; at least [`MAX_LN`] where there is no arc. Under
 /// ceilings, of the times beyond that on the ceilings.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",

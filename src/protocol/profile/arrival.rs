@@ -17,7 +17,6 @@
 //! with `theta_b = 1 - (1 - theta_0) e^-t` for `floor = 1` and `theta_0 + t` for 0; all terms are positive. Both are
 //! integrated backwards from `t_f`, until `e^-R` is negligible.
 
-use crate::numerics::{MAX_EXPONENT, MAX_PANELS};
 use multiversion::multiversion;
 
 use super::curve::{CurvePanel, VelocityCurve, x_and_z_at_nodes};
@@ -25,6 +24,7 @@ use super::{Exponent, panel_variation};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
 use crate::numerics::root::{Probe, newton};
+use crate::numerics::{MAX_LN, MAX_PANELS};
 use crate::protocol::SolverStats;
 
 /// The equation for `c`: quantities that do not depend on it.
@@ -161,7 +161,7 @@ impl<E: Exponent> ArrivalProblem<E> {
             while d != range.to {
                 let panel = curve.panel(&range, d, panel_variation);
                 let panel = curve.limit_slip(panel, sums.v, curve.last(&panel), panel_variation);
-                let sound = panel.to != d && !panel.to.is_nan() && sums.slip <= MAX_EXPONENT;
+                let sound = panel.to != d && !panel.to.is_nan() && sums.slip <= MAX_LN;
                 if !sound || count == MAX_PANELS {
                     return None;
                 }

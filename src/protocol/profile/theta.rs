@@ -4,7 +4,6 @@
 //! terms. Where the slip is large, theta follows `1/v` and does not depend on its start: Radau collocation gives
 //! `theta'` at the nodes.
 
-use crate::numerics::{LONG_ROUNDING_RTOL, MAX_PANELS};
 use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
@@ -14,6 +13,7 @@ use super::{Exponent, panel_variation};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_PANELS};
 use crate::protocol::SolverStats;
 use crate::protocol::control::{Tolerance, ValueRange};
 

@@ -4,10 +4,10 @@
 //! `ln theta = -1 - omega - s`, `dt = -(y/(c + y)) ds/v`. The time is in closed form, and the arc ends where `v = 1`; then `v = 1`
 //! (docs/derivations.md).
 
-use crate::numerics::ROUNDING_RTOL;
 use std::f64::consts::E;
 
 use super::{Chatter, Problem, Relaxed};
+use crate::numerics::ROUNDING_RTOL;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, crossing, newton};

@@ -12,13 +12,13 @@
 //!
 //! `c_i` the nodes of Radau IIA. It is implicit, so relaxation of theta in a few cycles does not limit its length.
 
-use crate::numerics::MAX_STEPS;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::integration::STAGES as S;
 use super::long_term::{Follower, excess};
 use super::orbit::{Orbit, StopReason};
 use super::scaled_block::SectionPoint;
+use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;

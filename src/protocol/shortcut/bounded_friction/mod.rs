@@ -33,7 +33,7 @@ use crate::model::{Transition, friction_margin};
 use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln_1p, ln_near_1};
 use crate::numerics::root::{Probe, newton};
-use crate::numerics::{HUGE, MAX_STEPS};
+use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
 use crate::protocol::{Motion, SolverStats};
 use motion::BoundedFrictionMotion;
 use panel::FrictionPanel;
@@ -109,7 +109,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
         return Err(Obstacle::Domain);
     }
     let unbounded = case.tau_ceiling == f64::INFINITY;
-    let distance = |v: f64| if unbounded { HUGE } else { friction_margin(law, case.tau_ceiling, v) };
+    let distance = |v: f64| if unbounded { MAX_SQUARABLE } else { friction_margin(law, case.tau_ceiling, v) };
     let (margin_i, margin_f) = (distance(v_i), distance(v_f));
     if margin_i <= 0.0 || margin_f <= 0.0 {
         return Err(Obstacle::FrictionAtEnds { friction: case.tau_ceiling - margin_i.min(margin_f) });
