@@ -91,6 +91,7 @@ ONLY_THE_CHECK = {
     "where_law",
     "where_more",
     "where_number_as_word",
+    "where_of_nan",
     "where_or_signs",
     "where_select",
     "where_shift",
