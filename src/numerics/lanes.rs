@@ -9,6 +9,15 @@ pub const LANES: usize = 8;
 /// One value per lane.
 pub type Lanes = [f64; LANES];
 
+/// The value of a closure for the index of every lane, written out. Loops would be unrolled anyway, but thousands of them keep the compiler busy for
+/// minutes.
+macro_rules! lanes {
+    ($of:expr) => {{
+        let of = $of;
+        [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
+    }};
+}
+
 /// The sum of all lanes, pairwise and in a fixed order.
 #[inline(always)]
 pub fn fold(sum: &Lanes) -> f64 {
@@ -26,11 +35,7 @@ pub fn least(values: &Lanes) -> f64 {
 /// `yes` in the lanes where `sign` is above 0, else `no`.
 #[inline(always)]
 pub fn choose(sign: Vector, yes: Vector, no: Vector) -> Vector {
-    let mut chosen = no;
-    for i in 0..LANES {
-        chosen.0[i] = if sign.0[i] > 0.0 { yes.0[i] } else { no.0[i] };
-    }
-    chosen
+    Vector(lanes!(|i: usize| if sign.0[i] > 0.0 { yes.0[i] } else { no.0[i] }))
 }
 
 /// The lesser of two numbers in each lane.
@@ -54,21 +59,13 @@ impl Vector {
     /// A function of every lane.
     #[inline(always)]
     pub fn map(self, f: impl Fn(f64) -> f64) -> Vector {
-        let mut out = [0.0; LANES];
-        for (out, x) in out.iter_mut().zip(self.0) {
-            *out = f(x);
-        }
-        Vector(out)
+        Vector(lanes!(|i: usize| f(self.0[i])))
     }
 
     /// A function of every pair of lanes.
     #[inline(always)]
     pub fn zip(self, other: Vector, f: impl Fn(f64, f64) -> f64) -> Vector {
-        let mut out = [0.0; LANES];
-        for ((out, x), y) in out.iter_mut().zip(self.0).zip(other.0) {
-            *out = f(x, y);
-        }
-        Vector(out)
+        Vector(lanes!(|i: usize| f(self.0[i], other.0[i])))
     }
 }
 
