@@ -121,7 +121,8 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
     let has_bound = table::find(name).is_some_and(|table| table.columns().iter().any(|column| column.name == "bound"));
     let is_written = statistics.columns.iter().any(|(column, _)| column == "bound");
     if statistics.status[Status::Infeasible as usize] > 0 && has_bound && !is_written {
-        let help = "help: the column `bound` states why a row is infeasible: columns = [..., \"bound\"]";
+        let help =
+            "help: the column `bound` states why a row is infeasible: columns = [..., \"bound\"] under another `name`";
         blocks.push(SummaryBlock::Line(2, help.to_owned()));
     }
     blocks

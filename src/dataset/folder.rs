@@ -13,6 +13,17 @@ use super::state::{self, CheckDepth, State};
 /// The help if the folder contains another dataset.
 const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
+/// How a spec gets the tables of a dataset that it lacks; a reduction has a key of `gap` instead of a table.
+fn remedy(missing: &[String]) -> String {
+    let of_gap = |name: &str| {
+        name.strip_prefix("gap_").map(|reduction| format!("set `reduce = \"{reduction}\"` in [tables.gap]"))
+    };
+    let tables: Vec<&str> = missing.iter().map(String::as_str).filter(|name| of_gap(name).is_none()).collect();
+    let tables = (!tables.is_empty()).then(|| format!("add [tables.{}] to the spec", tables.join("] and [tables.")));
+    let parts: Vec<String> = tables.into_iter().chain(missing.iter().filter_map(|name| of_gap(name))).collect();
+    format!("{}, which keeps its rows and computes yours", parts.join(" and "))
+}
+
 /// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs)]
@@ -29,9 +40,8 @@ pub enum DatasetError {
     OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
     /// The folder contains tables that the spec lacks, and lacks tables of the spec.
     #[error(
-        "{folder}: the spec and the dataset each have a table that the other lacks\n  in the spec: {expected}\n  in the dataset: {found}\n  help: add \
-         [tables.{}] to the spec, which keeps its rows and computes yours; or {OTHER_SPEC_HELP}",
-        missing.join("] and [tables.")
+        "{folder}: the spec and the dataset each have a table that the other lacks\n  in the spec: {expected}\n  in the dataset: {found}\n  help: {}; or {OTHER_SPEC_HELP}",
+        remedy(missing)
     )]
     OtherTables { folder: String, expected: String, found: String, missing: Vec<String> },
     /// Another run writes the dataset.

@@ -60,6 +60,11 @@ pub enum PlotError {
         "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them; several of them separated by commas\n  help: such as --where \"a=0.03, v_f>=10\"; `slipsweep query` supports `or` and `in`"
     )]
     Condition { text: String },
+    /// A word for a column of numbers.
+    #[error(
+        "--where {text}: the column `{column}` has numbers\n  expected: a number without a unit, such as 0.03, 1e-6 or inf\n  help: correct the value"
+    )]
+    NotNumber { text: String, column: String },
     /// No row meets the conditions.
     #[error("--where {text}: no row of the table `{table}` meets this\n  found: {found}\n  help: {help}")]
     NoRows { table: String, text: String, found: String, help: String },

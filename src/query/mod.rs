@@ -21,6 +21,7 @@ use polars::sql::SQLContext;
 
 use crate::dataset::{DatasetError, guarded};
 use crate::names::{hint, nearest};
+use crate::table;
 
 pub use answer::{Answer, AnswerError, Format};
 use checked_query::CheckedQuery;
@@ -139,7 +140,19 @@ impl Tables {
             let name = line.split(['"', '\'']).nth(1).unwrap_or_default();
             let read = || self.sources.iter().filter(|source| checked.read.contains(&source.name));
             let columns = || read().flat_map(|source| &source.columns).map(String::as_str);
+            let is_optional = |source: &&Source| {
+                let table = table::find(&source.name);
+                table.is_some_and(|table| table.columns().iter().any(|column| column.name == name))
+            };
             let help = match nearest(name, columns()) {
+                _ if ["inf", "infinity", "nan"].contains(&name.to_lowercase().as_str()) => {
+                    format!("CAST('{name}' AS DOUBLE) is this number")
+                }
+                _ if read().any(|source| is_optional(&source)) => {
+                    format!(
+                        "the dataset lacks this optional column; name it in `columns` of a spec with another `name`, and run that"
+                    )
+                }
                 None if sql.contains(&format!("\"{name}\"")) => {
                     format!("text goes in single quotes: '{name}'; double quotes are for names of columns")
                 }
@@ -175,7 +188,7 @@ impl Tables {
         } else if known("LIMIT/OFFSET") {
             ("LIMIT and OFFSET take whole numbers from 0".to_owned(), "correct the number".to_owned())
         } else if known("dtype") || known("cannot compare") || known("cannot cast") {
-            let help = "words can be compared and counted; arithmetic, sum and avg need numbers";
+            let help = "words can be compared and counted; arithmetic, sum and avg need numbers; CAST('inf' AS DOUBLE) is infinity";
             ("words in place of numbers, or numbers in place of words".to_owned(), help.to_owned())
         } else {
             (line.to_owned(), "correct the query".to_owned())

@@ -73,7 +73,10 @@ impl Sweep {
             Ok(other) => match self.difference(&other, &table) {
                 Some(difference) => [here, there] = difference,
                 None => {
-                    here = "the points that it refers to".to_owned();
+                    here = match read::value(&self.text, "points") {
+                        Some(file) => format!("points = {file}{}", self.at("points")),
+                        None => "the points that it refers to".to_owned(),
+                    };
                     there = "other contents of the same file".to_owned();
                 }
             },
@@ -94,16 +97,44 @@ impl Sweep {
             facts
         };
         let [here, there] = [facts(self), facts(other)];
-        let (key, value) = here.iter().find(|fact| !there.contains(fact))?;
-        let other_value = there.iter().find(|(known, _)| known == key).map_or("nothing", |(_, value)| value);
-        let is_written = |key: &str| [self, other].iter().any(|sweep| read::value(&sweep.text, key).is_some());
-        let key = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
-        // Or the default value.
-        let written = |sweep: &Sweep, value: &str| read::value(&sweep.text, key).unwrap_or_else(|| value.to_owned());
-        let [here, there] = differing([written(self, value), written(other, other_value)]);
-        let line = read::line(&self.text, key).map_or_else(String::new, |line| format!(" (line {line})"));
-        Some([format!("{key} = {here}{line}"), format!("{key} = {there}")])
+        let new = here.iter().filter(|fact| !there.contains(fact));
+        let lost = there.iter().filter(|fact| !here.contains(fact));
+        // An axis says more than the order of all axes.
+        let mut keys: Vec<&str> = new.chain(lost).map(|(key, _)| key.as_str()).collect();
+        keys.sort_by_key(|key| is_order(key));
+        keys.into_iter().find_map(|key| {
+            let is_written = |key: &str| [self, other].iter().any(|sweep| read::value(&sweep.text, key).is_some());
+            let name = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
+            let value = |sweep: &Sweep, facts: &[(String, String)]| {
+                let default = || facts.iter().find(|(known, _)| known == key).map(|(_, value)| value.clone());
+                read::value(&sweep.text, name).or_else(|| default().filter(|_| is_order(key) || !key.contains("axes.")))
+            };
+            let missing = || format!("no {name}");
+            match [value(self, &here), value(other, &there)] {
+                [Some(here), Some(there)] => {
+                    let [here, there] = differing([here, there]);
+                    Some([format!("{name} = {here}{}", self.at(name)), format!("{name} = {there}")])
+                }
+                [Some(here), None] => {
+                    Some([format!("{name} = {}{}", shown(&here, MAX_SHOWN_CHARS), self.at(name)), missing()])
+                }
+                [None, Some(there)] => Some([missing(), format!("{name} = {}", shown(&there, MAX_SHOWN_CHARS))]),
+                [None, None] => None,
+            }
+        })
     }
+
+    /// The line of a key in the spec, for a message.
+    fn at(&self, key: &str) -> String {
+        let is_written = is_order(key) || read::value(&self.text, key).is_some();
+        let line = read::line(&self.text, key).filter(|_| is_written);
+        line.map_or_else(String::new, |line| format!(" (line {line})"))
+    }
+}
+
+/// Whether a key is the order of the axes.
+fn is_order(key: &str) -> bool {
+    key == "axes" || key.ends_with("].axes")
 }
 
 /// Two values in a message, long ones from shortly before their difference on.

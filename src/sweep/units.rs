@@ -116,6 +116,9 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
 /// Velocity in m/s above which SI values are probably scaled values. Chosen: brakes slide at up to 50 m/s, faults at some 10 m/s.
 const MAX_PLAUSIBLE_VELOCITY: f64 = 50.0;
 
+/// Normal stress in Pa below which the value is probably in MPa. Chosen: a book on a table presses with some 100 Pa, rock experiments with 1e5 to 1e9 Pa.
+const MIN_PLAUSIBLE_STRESS: f64 = 100.0;
+
 /// The warnings on scales of `model` that are probably in other units. Limits chosen: faults slip over centimetres to reach steady friction, and
 /// friction coefficients are about 1.
 pub fn doubtful_scales(model: &ModelSpec) -> Vec<SpecError> {
@@ -125,16 +128,30 @@ pub fn doubtful_scales(model: &ModelSpec) -> Vec<SpecError> {
         let (found, expected) = (format!("{value}{unit} is unusually large"), format!("usually below {most}{unit}"));
         Some(SpecError::new(format!("model.{name}"), found, expected, "check the unit"))
     });
-    large.collect()
+    let small = model.normal_stress.filter(|value| *value < MIN_PLAUSIBLE_STRESS).map(|value| {
+        let expected = format!("usually above {MIN_PLAUSIBLE_STRESS} Pa");
+        SpecError::new(
+            "model.normal_stress",
+            format!("{value} Pa is unusually small"),
+            expected,
+            "check the unit: 1 MPa is 1e6",
+        )
+    });
+    large.chain(small).collect()
+}
+
+fn is_velocity(quantity: Quantity) -> bool {
+    matches!(quantity, Quantity::InitialVelocity | Quantity::FinalVelocity | Quantity::VelocityCeiling)
 }
 
 /// The warning that `axis`, whose key begins with `prefix`, is probably not in SI units, if so.
 pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
-    if *units == Units::Scaled || !matches!(axis.quantity, Quantity::InitialVelocity | Quantity::FinalVelocity) {
+    if *units == Units::Scaled || !is_velocity(axis.quantity) {
         return None;
     }
     let greatest = match &axis.values {
-        Values::List(values) => values.iter().copied().fold(0.0, f64::max),
+        // No ceiling is legal.
+        Values::List(values) => values.iter().copied().filter(|value| value.is_finite()).fold(0.0, f64::max),
         Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => first.max(*last),
     };
     (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {

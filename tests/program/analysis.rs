@@ -168,7 +168,8 @@ fn wrong_questions_are_answered_with_the_known_names() {
     let folder = small();
     let columns = "best_cubic: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, gap, v_min, status";
     let correct = "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
-    let types = "words can be compared and counted; arithmetic, sum and avg need numbers";
+    let types =
+        "words can be compared and counted; arithmetic, sum and avg need numbers; CAST('inf' AS DOUBLE) is infinity";
     for (question, found, help) in [
         (
             "SELECT worck FROM best_cubic",
@@ -184,6 +185,16 @@ fn wrong_questions_are_answered_with_the_known_names() {
             "SELECT temperature FROM best_cubic",
             &format!("no column `temperature`\n  expected: a column of {columns}"),
             "choose one of these; text goes in single quotes: 'temperature'",
+        ),
+        (
+            "SELECT v_max FROM best_cubic",
+            &format!("no column `v_max`\n  expected: a column of {columns}"),
+            "the dataset lacks this optional column; name it in `columns` of a spec with another `name`, and run that",
+        ),
+        (
+            "SELECT gap FROM best_cubic WHERE t_f = inf",
+            &format!("no column `inf`\n  expected: a column of {columns}"),
+            "CAST('inf' AS DOUBLE) is this number",
         ),
         (
             "SELECT gap FROM best_cubi",

@@ -112,12 +112,17 @@ fn doubtful_axes_and_scales() {
     let unbound = spec.replace("[300.0, inf]", "inf");
     fs::write(folder.path().join("unbound.toml"), unbound).expect("is writable");
     assert!(slipsweep(&["plan", "unbound.toml"], folder.path()).stderr.is_empty());
-    let si = "name = \"si\"\n[model]\nunits = \"si\"\nmu_0 = 60\nl = 20\nv_0 = 1e-4\nnormal_stress = 1e6\n[axes]\na = 0.018\nb = 0.03\n\
-              v_i = 3.0\nv_f = 10.0\n[tables.crossover]\n";
+    let si = "name = \"si\"\n[model]\nunits = \"si\"\nmu_0 = 60\nl = 20\nv_0 = 1e-4\nnormal_stress = 25\n[axes]\nt_f = 9\na = 0.018\n\
+              b = 0.03\nv_i = 3.0\nv_f = 10.0\nv_ceiling = [500, inf]\n[tables.optimal]\n";
     fs::write(folder.path().join("si.toml"), si).expect("is writable");
     let output = slipsweep(&["plan", "si.toml"], folder.path());
     let warnings = String::from_utf8_lossy(&output.stderr);
-    for expected in ["si.toml:5: model.l: 20 m is unusually large", "si.toml:4: model.mu_0: 60 is unusually large"] {
+    for expected in [
+        "si.toml:5: model.l: 20 m is unusually large",
+        "si.toml:4: model.mu_0: 60 is unusually large",
+        "si.toml:7: model.normal_stress: 25 Pa is unusually small",
+        "si.toml:14: axes.v_ceiling: 500.0 m/s is unusually fast",
+    ] {
         assert!(warnings.contains(expected), "{warnings}");
     }
 }

@@ -67,6 +67,13 @@ fn a_table_that_is_added_is_computed_into_the_same_dataset() {
         )
     );
     assert_eq!(files(&folder.path().join("test")), after);
+
+    // A reduction is a key of `gap`, and no table of a spec.
+    let out = folder.path().join("reduced");
+    run(&sweep(folder.path(), &wider, "[tables.gap]\nreduce = \"min\"\n"), &out, 1);
+    let reported = refusal(&sweep(folder.path(), &wider, "[tables.gap]\n"), &out);
+    let help = "\n  help: set `reduce = \"min\"` in [tables.gap], which keeps its rows and computes yours; or change";
+    assert!(reported.contains(help), "{reported}");
 }
 
 #[test]
@@ -126,6 +133,7 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
             "tables.optimal.columns = [\"work\"] (line 9)",
             "tables.optimal.columns = work, v_start, v_end, time_at_floor, time_at_v_ceiling, time_at_tau_ceiling, hamiltonian, theta_max,...",
         ),
+        (first.replace("t_f = 1", "t_f = 1\nv_ceiling = 3e2"), "axes.v_ceiling = 3e2 (line 4)", "no axes.v_ceiling"),
         (
             first.replace("name = \"test\"", "name = \"test\"\nwhere = \"t_f > a\""),
             "where = \"t_f > a\" (line 2)",
@@ -150,6 +158,18 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
     let reported = refusal(&here, &out);
     assert!(
         reported.contains("\n  in the spec: axes = v_f, t_f (line 2)\n  in the dataset: axes = t_f, v_f\n"),
+        "{reported}"
+    );
+
+    // An axis that only one of them has.
+    let with_law = load(&first.replace("t_f = 1", "t_f = 1\nlaw = \"ageing\""));
+    let out = folder.path().join("law");
+    run(&with_law, &out, 1);
+    let reported = refusal(&load(&first), &out);
+    assert!(reported.contains("\n  in the spec: no axes.law\n  in the dataset: axes.law = \"ageing\"\n"), "{reported}");
+    let reported = refusal(&with_law, folder.path());
+    assert!(
+        reported.contains("\n  in the spec: axes.law = \"ageing\" (line 4)\n  in the dataset: no axes.law\n"),
         "{reported}"
     );
 }
@@ -184,7 +204,7 @@ fn other_points_in_the_same_file_are_another_spec() {
     let reported = refusal(&Sweep::load(&path).expect("is legal"), folder.path());
     assert!(
         reported.contains(
-            "\n  in the spec: the points that it refers to\n  in the dataset: other contents of the same file\n"
+            "\n  in the spec: points = \"points.csv\" (line 2)\n  in the dataset: other contents of the same file\n"
         ),
         "{reported}"
     );

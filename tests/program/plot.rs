@@ -158,6 +158,11 @@ fn refusals(folder: &Path) {
     let near = with(&["--where", "t_f=0.0200001, b=0.05"]);
     assert!(near.ends_with("  help: the nearest rows have --where \"t_f=0.02, b=0.05\"\n"), "{near}");
     assert_eq!(
+        with(&["--where", "t_f<0.02s AND b=0.05"]),
+        "error: --where t_f < 0.02s: the column `t_f` has numbers\n  expected: a number without a unit, such as 0.03, 1e-6 or inf\n  help: \
+         correct the value\n"
+    );
+    assert_eq!(
         with(&["--where", "tf=0.02"]),
         "error: --where: the table `gap` has no column `tf`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3, work, work_optimal, \
          gap, v_min, status\n  help: did you mean `t_f`?\n"
@@ -457,6 +462,24 @@ fn the_map_of_optima_shows_the_strategy_and_when_it_changes() {
     }
     let (same, _) = picture("same", &spec.replace("0.01, 0.1", "0.001, 0.01"), "optimal");
     assert!(same.contains("W* (μ0 σ l)") && !same.contains("speed up"), "{same}");
+}
+
+#[test]
+fn gaps_below_zero_have_a_colour_of_their_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    // Cubic shortcuts are faster than the ceiling where they are short.
+    for (name, ceiling, is_below) in [("bounded", "1e3", true), ("free", "inf", false)] {
+        let spec = format!(
+            "name = \"{name}\"\n[axes]\nt_f = {{ geomspace = [0.005, 0.1, 9] }}\n{MATERIAL}v_f = {{ geomspace = [50.0, 200.0, 9] }}\n\
+             v_ceiling = {ceiling}\n[tables.best_cubic]\n"
+        );
+        fs::write(folder.join("spec.toml"), spec).expect("is writable");
+        shown(folder, &["run", "spec.toml", "--quiet"]);
+        shown(folder, &["plot", &format!("results/{name}"), "--color", "gap", "--out", "map.svg"]);
+        let words = words(&read(folder, "map.svg"));
+        assert_eq!(words.contains("\ngap below 0\n"), is_below, "{words}");
+    }
 }
 
 #[test]

@@ -38,12 +38,14 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// The conditions in `text`, separated by commas or `and`.
+    /// The conditions in `text`, separated by commas or `and` in any case.
     ///
     /// # Errors
     ///
     /// A condition without a column, a comparison and a value.
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
+        const AND: &str = " and ";
+        let is_and = |rest: &str| rest.get(..AND.len()).is_some_and(|start| start.eq_ignore_ascii_case(AND));
         let (mut all, mut from, mut quote) = (Vec::new(), 0, None);
         for (place, letter) in text.char_indices() {
             // A separator in quotes belongs to a word.
@@ -57,7 +59,7 @@ impl Condition {
                     continue;
                 }
                 (',', _) => ",",
-                (' ', _) if text[place..].starts_with(" and ") => " and ",
+                (' ', _) if is_and(&text[place..]) => AND,
                 _ => continue,
             };
             if place >= from {
@@ -74,14 +76,19 @@ impl Condition {
 
     fn one(text: &str) -> Result<Condition, PlotError> {
         let wrong = || PlotError::Condition { text: text.trim().to_owned() };
-        if text.contains(" or ") || text.to_lowercase().contains(" in ") {
+        if [" or ", " in "].iter().any(|word| text.to_lowercase().contains(word)) {
             return Err(wrong());
         }
         // The first sign; of several at one position, the longest, which comes first in `SIGNS`.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
         let (place, length, relation) = found.min_by_key(|(place, ..)| *place).ok_or_else(wrong)?;
-        let (column, value) = (text[..place].trim(), text[place + length..].trim().trim_matches(['"', '\'']));
-        if column.is_empty() || value.is_empty() || value.starts_with(['<', '>', '=', '!']) {
+        let (column, typed) = (text[..place].trim(), text[place + length..].trim());
+        let is_quoted = |quote: char| typed.len() > 1 && typed.starts_with(quote) && typed.ends_with(quote);
+        let quoted = ['"', '\''].into_iter().find(|quote| is_quoted(*quote));
+        let value = quoted.map_or(typed, |quote| typed.trim_matches(quote));
+        // A sign in a value without quotes belongs to a second condition.
+        let is_other = quoted.is_none() && value.contains(['<', '>', '=', '!', '&', '|', '"', '\'']);
+        if column.is_empty() || value.is_empty() || is_other {
             return Err(wrong());
         }
         Ok(Condition { column: column.to_owned(), relation, value: value.to_owned() })
@@ -122,6 +129,11 @@ impl Condition {
     /// The number in an equality.
     pub fn wanted(&self) -> Option<f64> {
         (self.relation == Relation::Equal).then(|| self.value.parse().ok()).flatten()
+    }
+
+    /// Whether the value is a number.
+    pub fn is_of_number(&self) -> bool {
+        self.value.parse::<f64>().is_ok()
     }
 
     /// The word in an equality.
@@ -166,6 +178,14 @@ mod tests {
 
     #[test]
     fn conditions_are_read_and_kept() {
+        for and in ["and", "AND", "And"] {
+            let text = format!("a=0.03, v_f>=10 {and} family != cubic");
+            let conditions = Condition::all(&text).expect("three conditions");
+            assert_eq!(
+                conditions.iter().map(Condition::shown).collect::<Vec<_>>(),
+                ["a = 0.03", "v_f >= 10", "family != cubic"]
+            );
+        }
         let conditions = Condition::all("a=0.03, v_f>=10 and family != cubic").expect("three conditions");
         assert_eq!(conditions.iter().map(|c| c.column.as_str()).collect::<Vec<_>>(), ["a", "v_f", "family"]);
         assert!(conditions[0].holds(0.03) && !conditions[0].holds(0.031) && !conditions[0].holds(f64::NAN));
@@ -209,7 +229,19 @@ mod tests {
 
     #[test]
     fn what_is_no_condition_is_refused() {
-        for text in ["a", "=3", "a=", "a=1,", "", "material='gabbro, wet"] {
+        for text in [
+            "a",
+            "=3",
+            "a=",
+            "a=1,",
+            "",
+            "material='gabbro, wet",
+            "a=1 && b=2",
+            "a=1 or b=2",
+            "a=1 OR b=2",
+            "a IN (1)",
+            "a='x",
+        ] {
             assert!(matches!(Condition::all(text), Err(PlotError::Condition { .. })), "{text}");
         }
     }

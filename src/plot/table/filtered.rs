@@ -140,6 +140,10 @@ impl FilteredTable {
         };
         for condition in conditions {
             filtered.check("--where", "column", &condition.column)?;
+            let is_number = filtered.heading(&condition.column).is_some_and(|heading| heading.is_number);
+            if is_number && !condition.is_of_number() {
+                return Err(PlotError::NotNumber { text: condition.shown(), column: condition.column.clone() });
+            }
         }
         let known = table::find(name).map_or(&[][..], |table| table.axes());
         let names = filtered.headings.iter().map(|heading| heading.name.as_str());

@@ -32,6 +32,12 @@ const DOT_ROOM: f64 = 0.04;
 /// Pixels along an axis with cells of unequal width. Chosen: more than its cells.
 const PIXELS: usize = 1024;
 
+/// Greatest magnitude of a gap below 0 that counts as rounding. Chosen: above the error of a gap at any usual `rtol`.
+const MAX_ROUNDED_GAP: f64 = 1e-6;
+
+/// The colour of gaps below 0: none of the colours of the scale.
+const BELOW_ZERO: [u8; 3] = [0xcc, 0x79, 0xa7];
+
 /// The plan of a map.
 #[derive(Debug, Clone)]
 pub struct MapColumns {
@@ -214,7 +220,7 @@ impl Shading<'_> {
         }
         let values = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
         let all = Scale::of(values()).ok_or(PlotError::Nothing)?;
-        // A gap is negative only by rounding, so it has a logarithmic scale.
+        // A gap has a logarithmic scale; one below 0 has a colour of its own.
         let scale = match Scale::of(values().filter(|value| *value > 0.0)) {
             Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
             _ if all.high > all.low => all,
@@ -237,9 +243,16 @@ impl Shading<'_> {
         if self.is_stability() { 1 - (word as usize).min(1) } else { word as usize }
     }
 
+    /// Whether a value is a gap below 0, beyond the accuracy of both works: of a shortcut above the velocity ceiling, or a step that has not arrived.
+    fn is_below(&self, value: f64) -> bool {
+        let is_logarithmic = self.colours.as_ref().is_some_and(|colours| colours.scale.log);
+        self.column == "gap" && is_logarithmic && value < -MAX_ROUNDED_GAP
+    }
+
     /// The colour of a value; `None` for NaN.
     fn colour(&self, value: f64) -> Option<[u8; 3]> {
         (!value.is_nan()).then(|| match &self.colours {
+            _ if self.is_below(value) => BELOW_ZERO,
             Some(Colours { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
             Some(Colours { scale, .. }) => viridis(scale.fraction(value)),
             None => class(self.shade(value)),
@@ -261,7 +274,11 @@ impl Shading<'_> {
             key: if are_dots { Key::Mark(Symbol::of_row(None, 0)) } else { Key::Hatch },
             text: nothing(sheets),
         };
-        words.chain(has(&f64::is_nan).then(hole)).collect()
+        let below = || Entry {
+            key: if are_dots { Key::Mark(Symbol::of_row(Some(BELOW_ZERO), 0)) } else { Key::Fill(BELOW_ZERO) },
+            text: "gap below 0".to_owned(),
+        };
+        words.chain(has(&|value| self.is_below(value)).then(below)).chain(has(&f64::is_nan).then(hole)).collect()
     }
 
     fn meaning(&self, word: &str) -> String {
