@@ -149,9 +149,7 @@ impl Tables {
                     format!("CAST('{name}' AS DOUBLE) is this number")
                 }
                 _ if read().any(|source| is_optional(&source)) => {
-                    format!(
-                        "the dataset lacks this optional column; name it in `columns` of a spec with another `name`, and run that"
-                    )
+                    "the dataset lacks this optional column; name it in `columns` of a spec with another `name`, and run that".to_owned()
                 }
                 None if sql.contains(&format!("\"{name}\"")) => {
                     format!("text goes in single quotes: '{name}'; double quotes are for names of columns")

@@ -99,7 +99,7 @@ impl Sweep {
         let [here, there] = [facts(self), facts(other)];
         let new = here.iter().filter(|fact| !there.contains(fact));
         let lost = there.iter().filter(|fact| !here.contains(fact));
-        // An axis says more than the order of all axes.
+        // An axis is more specific than the order of all axes.
         let mut keys: Vec<&str> = new.chain(lost).map(|(key, _)| key.as_str()).collect();
         keys.sort_by_key(|key| is_order(key));
         keys.into_iter().find_map(|key| {
