@@ -150,7 +150,7 @@ pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
         return None;
     }
     let greatest = match &axis.values {
-        // No ceiling is legal.
+        // An infinite ceiling is legal: it means none.
         Values::List(values) => values.iter().copied().filter(|value| value.is_finite()).fold(0.0, f64::max),
         Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => first.max(*last),
     };
