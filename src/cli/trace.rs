@@ -422,7 +422,7 @@ impl Arguments {
         };
         let friction = self.friction.unwrap_or_default();
         let known = if self.from.is_some() { "feedback" } else { name };
-        let (protocol, case) = Protocol::new(known, (friction, !self.unbounded), number)
+        let (protocol, case) = Protocol::new(known, (friction, !self.unbounded, [true; 2]), number)
             .map_err(|quantity| wrong(format!("`{name}` needs {}", flag(quantity))))?;
         let is_number = |quantity: Quantity| !quantity.has_scale() && quantity != Quantity::Law;
         let numbers = given.iter().filter(|(quantity, _)| is_number(*quantity));

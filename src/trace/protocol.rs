@@ -4,7 +4,8 @@ use super::disturbed::{self, Disturbance, Rest};
 use super::sample;
 use crate::grid::Quantity;
 use crate::model::{Friction, Law, StateLaw, Transition};
-use crate::protocol::cubic::{Landscape, LandscapeBuffers};
+use crate::numerics::double_double::DoubleDouble;
+use crate::protocol::cubic::Landscape;
 use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
 use crate::protocol::{
@@ -28,7 +29,7 @@ pub enum Protocol {
     /// The cubic shortcut of least work, with `v >= 1` under the floor of `bounds`, compared with the optimum under them.
     BestCubic { law: StateLaw, bounds: Bounds },
     /// A point of the landscape, scaled: `alpha_2 t_f` and `alpha_3 t_f^2`.
-    CubicPoint { law: StateLaw, friction: Friction, a_2: f64, a_3: f64 },
+    CubicPoint { law: StateLaw, friction: Friction, place: [DoubleDouble; 2] },
     /// The member of a family.
     Family(&'static Family),
     /// The response of a block on a spring to a step of the control velocity.
@@ -71,14 +72,15 @@ pub fn has_floor(name: &str, friction: Friction) -> bool {
 }
 
 impl Protocol {
-    /// The protocol `name` and its case, from the scaled numbers of its [`quantities`]; the coefficients of a cubic are relative to the duration.
+    /// The protocol `name` and its case, from the scaled numbers of its [`quantities`]; `relative` states which of `alpha_2` and `alpha_3`
+    /// are relative to the duration.
     ///
     /// # Errors
     ///
     /// A quantity without a number; the family, if no protocol has this name.
     pub fn new(
         name: &str,
-        (friction, bounded): (Friction, bool),
+        (friction, bounded, relative): (Friction, bool, [bool; 2]),
         number: impl Fn(Quantity) -> Option<f64>,
     ) -> Result<(Protocol, Case), Quantity> {
         let number = |quantity: Quantity| number(quantity).ok_or(quantity);
@@ -99,8 +101,10 @@ impl Protocol {
             ("feedback", _) => Protocol::OptimalFrom { theta: number(Quantity::Theta)?, bounds },
             ("best_cubic", _) => Protocol::BestCubic { law: state_law, bounds },
             ("gap", _) => {
-                let (a_2, a_3) = (number(Quantity::Alpha2)?, number(Quantity::Alpha3)?);
-                Protocol::CubicPoint { law: state_law, friction, a_2, a_3 }
+                let alphas = [number(Quantity::Alpha2)?, number(Quantity::Alpha3)?].map(DoubleDouble::new);
+                let units = [DoubleDouble::new(t_f), DoubleDouble::product(t_f, t_f)];
+                let place = [0, 1].map(|i| if relative[i] { alphas[i] } else { alphas[i] * units[i] });
+                Protocol::CubicPoint { law: state_law, friction, place }
             }
             // With a rigid spring, or without a change of velocity, the block follows the load point at once, which only
             // the ageing law has as a shortcut.
@@ -272,7 +276,7 @@ impl Protocol {
             Protocol::Relaxed { law, v_ceiling } => relaxed_optimum(case, law, v_ceiling),
             Protocol::OptimalFrom { theta, bounds } => rest(case, theta, &bounds, rtol),
             Protocol::BestCubic { law, bounds } => least_cubic(case, law, &bounds, rtol),
-            Protocol::CubicPoint { law, friction, a_2, a_3 } => gap(case, (law, friction), (a_2, a_3), rtol),
+            Protocol::CubicPoint { law, friction, place } => gap(case, (law, friction), place, rtol),
             Protocol::Family(family) => member(family, case, rtol),
             Protocol::StepResponse { state_law, k, m } => response(case, state_law, (k, m), rtol),
             Protocol::Compliant { k, m } => smooth(case, k, m, rtol),
@@ -466,7 +470,7 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
         return Err(Absence::Border);
     }
     let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
-    let Some(motion) = landscape.motion(value.a_2, value.a_3, Friction::Log) else {
+    let Some(motion) = landscape.motion([value.a_2, value.a_3].map(DoubleDouble::new), Friction::Log) else {
         return Err(Absence::Border);
     };
     let mut parameters = scaled(value.a_2, value.a_3);
@@ -481,23 +485,17 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
 fn gap(
     case: &Case,
     (law, friction): (StateLaw, Friction),
-    (a_2, a_3): (f64, f64),
+    place: [DoubleDouble; 2],
     rtol: f64,
 ) -> Result<TracedPath, Absence> {
     let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
-    let (mut work, mut v_min, mut status) = ([0.0], [0.0], [Status::Infeasible]);
-    let (a, b) = ([a_2], [a_3]);
-    let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
-    landscape.evaluate(&a, &b, out);
-    if friction == Friction::Regularised {
-        let out = LandscapeBuffers { work: &mut work, v_min: &mut v_min, status: &mut status };
-        landscape.regularise(&a, &b, rtol, out);
-    }
-    if status == [Status::NotConverged] {
+    let point = landscape.point(place, friction, rtol, &mut SolverStats::default()).ok_or(Obstacle::Velocity)?;
+    if point.status == Status::NotConverged {
         return Err(Obstacle::NotConverged.into());
     }
-    let motion = landscape.motion(a_2, a_3, friction).ok_or(Obstacle::Velocity)?;
-    Ok(TracedPath { motion, status: status[0], work: work[0], parameters: scaled(a_2, a_3) })
+    let motion = landscape.motion(place, friction).ok_or(Obstacle::Velocity)?;
+    let parameters = scaled(place[0].high, place[1].high);
+    Ok(TracedPath { motion, status: point.status, work: point.work, parameters })
 }
 
 fn scaled(a_2: f64, a_3: f64) -> Vec<Parameter> {

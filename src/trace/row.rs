@@ -66,8 +66,6 @@ pub fn protocol_of(
         let value = match quantity {
             Quantity::Time => time.or(t_f),
             Quantity::Law => word("law").and_then(StateLaw::find).map(|law| f64::from(law as u8)),
-            Quantity::Alpha2 if !relative[0] => written(quantity).zip(time).map(|(alpha, t_f)| alpha * t_f),
-            Quantity::Alpha3 if !relative[1] => written(quantity).zip(time).map(|(alpha, t_f)| alpha * t_f * t_f),
             _ => written(quantity),
         };
         // Tables of earlier versions lack some axes.
@@ -78,8 +76,8 @@ pub fn protocol_of(
         "shortcut" => word("family").ok_or(Pathless::Missing("family"))?,
         name => name,
     };
-    let (protocol, case) =
-        Protocol::new(name, (friction, bounded), number).map_err(|quantity| Pathless::Missing(quantity.name()))?;
+    let (protocol, case) = Protocol::new(name, (friction, bounded, relative), number)
+        .map_err(|quantity| Pathless::Missing(quantity.name()))?;
     let name = match protocol {
         Protocol::OptimalFrom { .. } => "optimal",
         Protocol::Family(family) => family.name,

@@ -4,6 +4,7 @@ use std::fs;
 use std::sync::Arc;
 
 use crate::common::{LANDSCAPE, MATERIAL, files, numbers, read, run, sweep, words, write_batch};
+use crate::reference;
 use arrow_array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use slipsweep::dataset::{Build, Folder};
@@ -144,6 +145,42 @@ fn coefficients_are_the_same_in_either_unit() {
         |column, unit: f64| numbers(&plain.1, column).iter().map(|cell| cell.map(|x| x * unit)).collect::<Vec<_>>();
     assert_eq!(numbers(&relative.1, "alpha_2"), scaled("alpha_2", 0.5));
     assert_eq!(numbers(&relative.1, "alpha_3"), scaled("alpha_3", 0.25));
+}
+
+/// The products of coefficients in natural units with the duration keep all digits.
+#[test]
+fn reference_coefficients_in_natural_units_are_good_to_rtol_up_to_the_border_of_feasibility() {
+    const AXES: [&str; 7] = ["a", "b", "v_i", "v_f", "t_f", "alpha_2", "alpha_3"];
+    let folder = tempfile::tempdir().expect("is writable");
+    let rows = reference::table("landscape_natural");
+    assert!(rows.len() >= 80, "{} rows", rows.len());
+    let points = rows.iter().map(|row| AXES.map(|axis| row.text(axis)).join(","));
+    let text = [AXES.join(",")].into_iter().chain(points).collect::<Vec<String>>().join("\n");
+    fs::write(folder.path().join("points.csv"), text).expect("is writable");
+    for rtol in [1e-6, 1e-9, 1e-12] {
+        let path = folder.path().join("spec.toml");
+        let text = format!(
+            "name = \"test\"\npoints = \"points.csv\"\n[accuracy]\nrtol = {rtol:e}\n[tables.gap]\n\
+             columns = [\"work\", \"v_min\", \"v_max\", \"work_error\"]\n"
+        );
+        fs::write(&path, text).expect("is writable");
+        let out = folder.path().join(format!("{rtol:e}"));
+        run(&Sweep::load(&path).expect("is legal"), &out, 2);
+        let frame = read(&out, "gap");
+        let status = words(&frame, "status");
+        for (i, row) in rows.iter().enumerate() {
+            assert_eq!(status[i], row.text("status"), "{row:?}");
+            for name in ["work", "v_min", "v_max"] {
+                let (found, expected) = (numbers(&frame, name)[i].expect("is feasible"), row.number(name));
+                let error = (found - expected).abs();
+                assert!(error <= 1.01 * rtol * expected.abs(), "{name} {found} at {rtol} in {row:?}");
+                if name == "work" {
+                    let bound = numbers(&frame, "work_error")[i].expect("is feasible");
+                    assert!(error <= bound, "{error:e} beyond {bound:e} at {rtol} in {row:?}");
+                }
+            }
+        }
+    }
 }
 
 #[test]

@@ -21,6 +21,8 @@ mod output;
 mod plot;
 mod properties;
 mod reduced;
+#[path = "../reference/mod.rs"]
+mod reference;
 mod report;
 mod schema;
 mod shards;

@@ -575,6 +575,41 @@ def landscape_rows():
         yield [repr(x) for x in case] + [show(work), show(v_min), status, show(v_max)]
 
 
+def natural_rows():
+    """Coefficients in natural units, whose products with the duration are no doubles; most are close to the border of feasibility."""
+    rng = random.Random(8)
+    cases = [
+        (0.03781888451588019, 0.03781888451588019, 3.1018218799667956, 43401.354232566286, 16.636174225670654, -0.01703758495701251, -0.0014750639772272733),
+        (0.025222672778663833, 0.025222672778663833, 11.913590201879229, 98403.75774227892, 2.4265525198504745e-06, -25955.54274215368, -21368352735.20225),
+    ]
+    while len(cases) < 80:
+        a = log_uniform(rng, 1e-3, 0.1)
+        b = rng.choice([0.0, a, a * log_uniform(rng, 0.1, 10)])
+        v_i, v_f = log_uniform(rng, 1.5, 1e3), log_uniform(rng, 1.5, 1e3)
+        t_f = log_uniform(rng, 1e-4, 1e2)
+        rise, lean = 1 / v_f - 1 / v_i, min(t_f, 1.0)
+        a_2, a_3 = rise * rng.uniform(0, 3) + lean * rng.uniform(-0.5, 1), rise * rng.uniform(-3, 3) + lean * rng.uniform(-1, 0.5)
+        inside = natural(a, b, v_i, v_f, t_f, a_2 / t_f, a_3 / t_f**2)
+        if not landscape_status(*inside):
+            continue
+        angle = rng.uniform(0, 6.283185307179586)
+        far = (a_2 + 3 * math.cos(angle), a_3 + 3 * math.sin(angle))
+        at = lambda s: (a, b, v_i, v_f, t_f, float((a_2 + s * (far[0] - a_2)) / t_f), float((a_3 + s * (far[1] - a_3)) / mpf(t_f) ** 2))
+        low, high = mpf(0), mpf(1)
+        for _ in range(50):
+            middle = (low + high) / 2
+            low, high = (middle, high) if landscape_status(*natural(*at(middle))) else (low, middle)
+        cases += [at(low * (1 - mpf(distance))) for distance in rng.sample([1e-6, 1e-9, 1e-11, 1e-13], 2)]
+    for case in cases:
+        work, v_min, v_max, status = landscape_point(*natural(*case))
+        yield [repr(x) for x in case] + [show(work), show(v_min), status, show(v_max)]
+
+
+def natural(a, b, v_i, v_f, t_f, alpha_2, alpha_3):
+    """The arguments of a shortcut with coefficients relative to the duration."""
+    return a, b, v_i, v_f, t_f, mpf(alpha_2) * mpf(t_f), mpf(alpha_3) * mpf(t_f) ** 2
+
+
 def landscape_status(a, b, v_i, v_f, t_f, a_2, a_3):
     """Feasible or not, without the quadrature."""
     v_i, v_f, t_f, a_2, a_3 = (mpf(x) for x in (v_i, v_f, t_f, a_2, a_3))
@@ -824,6 +859,7 @@ TABLES = {
                    "work_at_t_cross", "work_at_t_floor", "work_at_t_cheapest", "work_at_t_min", "work_at_t_turn"], crossover_rows),
     "optimal": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], optimal_rows),
     "landscape": (["a", "b", "v_i", "v_f", "t_f", "a_2", "a_3", "work", "v_min", "status", "v_max"], landscape_rows),
+    "landscape_natural": (["a", "b", "v_i", "v_f", "t_f", "alpha_2", "alpha_3", "work", "v_min", "status", "v_max"], natural_rows),
     "stability": (["a", "b", "k", "m", "v", "growth_rate", "frequency", "decay_rate"], stability_rows),
     "optimal_edges": (["regime", "a", "b", "v_i", "v_f", "t_f", "bounded", "work", "v_start", "v_end", "time_at_floor", "hamiltonian", "theta_max", "strategy"], edge_rows),
     "best_cubic_touching": (["a", "b", "v_i", "v_f", "t_f", "bounded", "a_2", "a_3", "work", "work_optimal", "gap", "v_max"], touching_rows),

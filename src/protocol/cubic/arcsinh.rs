@@ -40,14 +40,14 @@ impl Landscape {
     }
 
     /// Whether the difference to the logarithm is negligible, by the least velocity and the least theta.
-    fn is_logarithmic(&self, path: &Path<'_>, v_min: f64, rtol: f64) -> bool {
+    pub(super) fn is_logarithmic(&self, path: &Path<'_>, v_min: f64, rtol: f64) -> bool {
         let theta = [0.0, 1.0, path.theta.minimum()].map(|x| path.exact_theta().at(x).high);
         let least = 1.0 + self.law.a * ln(v_min) + self.law.b * ln(theta.into_iter().fold(f64::INFINITY, f64::min));
         least > 0.0 && self.law.a * exp(-2.0 * least / self.law.a) < NEGLIGIBLE * rtol * least
     }
 
     /// The work, and the number of nodes. Expansions about the ends and the minima of theta and `1 - theta'` keep the digits of both.
-    fn regularised_work(&self, path: &Path<'_>) -> Option<(f64, u32)> {
+    pub(super) fn regularised_work(&self, path: &Path<'_>) -> Option<(f64, u32)> {
         let inside = |x: f64| x > 0.0 && x < 1.0;
         let mut centres = vec![0.0, 1.0];
         centres.extend([path.theta.minimum(), path.n.minimum()].into_iter().filter(|&x| inside(x)));

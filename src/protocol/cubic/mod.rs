@@ -6,6 +6,7 @@
 mod arcsinh;
 mod bins;
 mod cells;
+mod exact;
 mod friction;
 mod kernel;
 mod least_velocity;
@@ -25,11 +26,13 @@ use std::ops::Range;
 
 use super::{Motion, SolverStats, Status};
 use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::LANES;
 use bins::Bins;
 use cells::CellInputs;
+pub use exact::CubicPoint;
 use friction::{FrictionBounds, decide};
 use kernel::Slice;
 use panel_batch::FrictionTerms;
@@ -106,9 +109,9 @@ impl Landscape {
     }
 
     /// The motion of the shortcut with these scaled coefficients, under a form of friction; `None` if it is infeasible.
-    pub fn motion(&self, a_2: f64, a_3: f64, friction: Friction) -> Option<Box<dyn Motion>> {
-        let is_feasible = Path::new(&self.ends, a_2, a_3).exact_status() != Status::Infeasible;
-        let motion = motion::CubicPoint { of: self.clone(), place: [a_2, a_3], friction };
+    pub fn motion(&self, place: [DoubleDouble; 2], friction: Friction) -> Option<Box<dyn Motion>> {
+        let motion = motion::CubicMotion { of: self.clone(), place, friction };
+        let is_feasible = motion.path().exact_status() != Status::Infeasible;
         is_feasible.then(|| Box::new(motion) as Box<dyn Motion>)
     }
 

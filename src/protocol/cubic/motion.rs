@@ -4,24 +4,25 @@ use super::Landscape;
 use super::path::Path;
 use super::rules::zeros;
 use crate::model::{Friction, StateLaw};
+use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
 
 /// The motion of one feasible shortcut; its parameter is `x = t/t_f`.
-pub(super) struct CubicPoint {
+pub(super) struct CubicMotion {
     pub of: Landscape,
     /// `alpha_2 t_f` and `alpha_3 t_f^2`.
-    pub place: [f64; 2],
+    pub place: [DoubleDouble; 2],
     pub friction: Friction,
 }
 
-impl CubicPoint {
-    fn path(&self) -> Path<'_> {
-        Path::new(&self.of.ends, self.place[0], self.place[1])
+impl CubicMotion {
+    pub fn path(&self) -> Path<'_> {
+        Path::exact(&self.of.ends, self.place[0], self.place[1])
     }
 }
 
-impl Motion for CubicPoint {
+impl Motion for CubicMotion {
     fn duration(&self) -> f64 {
         self.of.t_f
     }

@@ -1,0 +1,86 @@
+//! Cubic shortcuts one by one, from coefficients of 32 digits.
+//!
+//! A coefficient in natural units is a product with `t_f`. Where theta or `n` almost vanishes, the rounding of this product matters.
+
+use super::{Landscape, Path};
+use crate::model::{Friction, StateLaw};
+use crate::numerics::double_double::DoubleDouble;
+use crate::protocol::{SolverStats, Status};
+
+/// One shortcut.
+#[derive(Debug, Clone, Copy)]
+pub struct CubicPoint {
+    /// `Ok`, `BelowBound`, `NegativeFriction`, `Infeasible` or `NotConverged`.
+    pub status: Status,
+    /// `W_s`; NaN if it did not converge or is infeasible.
+    pub work: f64,
+    /// Least velocity.
+    pub v_min: f64,
+    /// Greatest velocity.
+    pub v_max: f64,
+}
+
+impl CubicPoint {
+    /// No such protocol.
+    pub const INFEASIBLE: Self =
+        CubicPoint { status: Status::Infeasible, work: f64::NAN, v_min: f64::NAN, v_max: f64::NAN };
+}
+
+/// The fraction of the tolerance of a velocity that the rounding of the coefficients may use. Chosen: a half.
+const ROUNDING_SHARE: f64 = 0.5;
+
+impl Landscape {
+    /// Whether the low words of the coefficients matter: they change theta by up to `|low_2| + |low_3|` and `n` by up to three times as much. The
+    /// bound `v = 1` is decided with all digits.
+    pub fn needs_low_words(&self, [a_2, a_3]: [DoubleDouble; 2], v_min: f64) -> bool {
+        let change = a_2.low.abs() + a_3.low.abs();
+        if change == 0.0 {
+            return false;
+        }
+        let path = Path::new(&self.ends, a_2.high, a_3.high);
+        let relative = |theta: f64, n: f64| {
+            let (theta, n) = (theta - path.slack(), n - 3.0 * path.slack());
+            if theta > 0.0 && n > 0.0 { change / theta + 3.0 * change / n } else { f64::INFINITY }
+        };
+        let tolerance = ROUNDING_SHARE * self.ends.v_loss;
+        let matters = relative(path.theta.bounds().0, path.n.bounds().0) > tolerance
+            && relative(path.theta.least(), path.n.least()) > tolerance;
+        matters || (v_min - 1.0).abs() <= tolerance
+    }
+
+    /// The shortcut with `alpha_2 t_f = a_2` and `alpha_3 t_f^2 = a_3` under a form of friction, its work good to `rtol`; `None` if it is
+    /// infeasible.
+    pub fn point(
+        &self,
+        [a_2, a_3]: [DoubleDouble; 2],
+        friction: Friction,
+        rtol: f64,
+        stats: &mut SolverStats,
+    ) -> Option<CubicPoint> {
+        let path = Path::exact(&self.ends, a_2, a_3);
+        let of_bounds = path.exact_status();
+        if of_bounds == Status::Infeasible {
+            return None;
+        }
+        let ([v_min, friction_min], own) = match self.state {
+            StateLaw::Ageing => ([path.least_velocity(), path.friction_min(self.law)], of_bounds),
+            _ => {
+                let least = self.least(&path);
+                (least, if least[0] < 1.0 { Status::BelowBound } else { Status::Ok })
+            }
+        };
+        let (mut status, mut work) = match friction {
+            Friction::Log => (own.with_friction(friction_min), f64::NAN),
+            Friction::Regularised => (Status::Ok, f64::NAN),
+        };
+        if friction == Friction::Log || self.is_logarithmic(&path, v_min, rtol) {
+            work = self.whole_work(&path, stats);
+        } else if let Some((found, nodes)) = self.regularised_work(&path) {
+            *stats += SolverStats { quadratures: 1, nodes };
+            work = found;
+        } else {
+            status = Status::NotConverged;
+        }
+        Some(CubicPoint { status, work, v_min, v_max: self.greatest_velocity(&path) })
+    }
+}
