@@ -21,7 +21,7 @@ pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
 }
 
 /// Names of our quantities and columns in other tools, in lower case.
-const SYNONYMS: [(&str, &[&str]); 14] = [
+const SYNONYMS: [(&str, &[&str]); 21] = [
     ("threads", &["jobs", "j", "cores", "workers", "cpus", "processes", "parallel"]),
     ("out", &["output", "output_dir", "outdir", "dir", "dest", "to"]),
     ("quiet", &["silent"]),
@@ -36,6 +36,13 @@ const SYNONYMS: [(&str, &[&str]); 14] = [
     ("k", &["stiffness"]),
     ("geomspace", &["logspace"]),
     ("m", &["mass"]),
+    ("plan", &["check", "validate", "lint", "dry_run", "estimate"]),
+    ("head", &["show", "view", "cat", "ls", "list", "preview"]),
+    ("summary", &["info", "describe", "stats", "inspect"]),
+    ("query", &["export", "sql", "select", "convert"]),
+    ("plot", &["draw", "figure", "picture"]),
+    ("init", &["new", "create", "start"]),
+    ("run", &["sweep", "solve", "compute", "resume"]),
 ];
 
 /// Greatest length of a name whose first letter must be correct, in characters. Chosen: `min` and `bin` are one letter away from `sin`.

@@ -1,5 +1,6 @@
 //! `slipsweep head DATASET [TABLE]`: the first rows of a table, with units.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use console::Term;
@@ -47,15 +48,23 @@ pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
     let width = Term::stdout().size_checked().map(|(_, columns)| columns.into());
-    let texts: Vec<String> = heads(arguments)?.into_iter().map(|head| head.text(arguments, width)).collect();
-    say(&texts.join("\n"))
+    let (heads, failure) = heads(arguments)?;
+    let texts: Vec<String> = heads.into_iter().map(|head| head.text(arguments, width)).collect();
+    if !texts.is_empty() {
+        say(&texts.join("\n"))?;
+    }
+    failure.map_or(Ok(()), Err)
 }
 
-/// The first rows of one table or of all, of a dataset or of a file.
+/// The first rows of one table or of all, and the first failure to read one.
+type Heads = (Vec<Head>, Option<Failure>);
+
+/// The first rows of tables of a dataset or of a file.
 #[cfg(feature = "query")]
-fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
-    let tables = Tables::open(&arguments.dataset)?;
-    let names: Vec<&str> = tables.sources.iter().map(|source| source.name.as_str()).collect();
+fn heads(arguments: &Arguments) -> Result<Heads, Failure> {
+    let Tables { sources, absent } = Tables::open(&arguments.dataset)?;
+    let names = sources.iter().map(|source| &source.name).chain(absent.iter().map(|table| &table.name));
+    let wanted = chosen(arguments, &names.map(String::as_str).collect::<Vec<_>>())?;
     let first = |source: &Source| {
         let mut rows = Vec::new();
         source
@@ -68,21 +77,31 @@ fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
         let lines = words::headed(source.columns.clone(), source.units.clone(), rows);
         Ok(Head { name: source.name.clone(), lines, rows: source.rows, missing: source.missing })
     };
-    chosen(arguments, &names)?.into_iter().map(|place| first(&tables.sources[place])).collect()
+    Ok(readable(wanted.into_iter().filter_map(|place| match sources.get(place) {
+        Some(source) => Some(first(source)),
+        None => {
+            let table = &absent[place - sources.len()];
+            let is_noted = !table.is_damaged() && arguments.notes_empty(&table.name);
+            (!is_noted).then(|| Err(table.error().into()))
+        }
+    })))
 }
 
-/// The first rows of one table of a dataset or of all.
+/// The first rows of tables of a dataset.
 #[cfg(not(feature = "query"))]
-fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
+fn heads(arguments: &Arguments) -> Result<Heads, Failure> {
     use crate::dataset::frame;
 
     let (folder, manifest) = super::dataset(&arguments.dataset)?;
     let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();
-    let mut heads = Vec::new();
-    for place in chosen(arguments, &names)? {
+    let first = |place: usize| {
         let table = &manifest.tables[place];
         let (paths, missing) = folder.verified(&manifest, table).map_err(Failure::failed)?;
-        let Some(first) = paths.first() else { continue };
+        let Some(first) = paths.first() else {
+            let help = "compute them with `slipsweep run`";
+            let error = || Failure::failed(format!("`{}` has no parts yet\n  help: {help}", table.name));
+            return if arguments.notes_empty(&table.name) { Ok(None) } else { Err(error()) };
+        };
         let headings = frame::headings(first).map_err(Failure::failed)?.0;
         let mut rows: Vec<Vec<String>> = Vec::new();
         for path in &paths {
@@ -97,9 +116,21 @@ fn heads(arguments: &Arguments) -> Result<Vec<Head>, Failure> {
         }
         let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
         let lines = words::headed(names, units, rows);
-        heads.push(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing });
+        Ok(Some(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing }))
+    };
+    Ok(readable(chosen(arguments, &names)?.into_iter().filter_map(|place| first(place).transpose())))
+}
+
+/// The tables that can be read, and the first failure.
+fn readable(heads: impl Iterator<Item = Result<Head, Failure>>) -> Heads {
+    let (mut found, mut failure) = (Vec::new(), None);
+    for head in heads {
+        match head {
+            Ok(head) => found.push(head),
+            Err(error) => failure = failure.or(Some(error)),
+        }
     }
-    Ok(heads)
+    (found, failure)
 }
 
 /// The places of the requested tables among `names`.
@@ -107,6 +138,16 @@ fn chosen(arguments: &Arguments, names: &[&str]) -> Result<Vec<usize>, Failure> 
     let Some(name) = &arguments.table else { return Ok((0..names.len()).collect()) };
     let place = names.iter().position(|known| known == name);
     place.map(|place| vec![place]).ok_or_else(|| no_table(&format!("{}: ", arguments.dataset.display()), name, names))
+}
+
+impl Arguments {
+    /// Prints a note on a table without parts, unless it was requested alone.
+    fn notes_empty(&self, table: &str) -> bool {
+        if self.table.is_none() {
+            let _ = writeln!(io::stderr(), "note: `{table}` has no parts yet; `slipsweep run` computes them");
+        }
+        self.table.is_none()
+    }
 }
 
 /// Replaces the middle columns of `lines` by `…` if they are wider than `width` characters, and returns their number.

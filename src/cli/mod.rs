@@ -278,6 +278,15 @@ fn ended(done: Result<(), Failure>) -> u8 {
     }
 }
 
+/// Options of other programs that ours does not need, and what it does instead.
+const NEEDLESS_OPTIONS: [(&str, &str); 5] = [
+    ("resume", "`slipsweep run` resumes by itself: it computes only what is missing"),
+    ("continue", "`slipsweep run` resumes by itself: it computes only what is missing"),
+    ("force", "a dataset is never replaced by another one: change `name` in the spec, or remove its folder"),
+    ("overwrite", "a dataset is never replaced by another one: change `name` in the spec, or remove its folder"),
+    ("dry_run", "`slipsweep plan` checks a spec and estimates its run"),
+];
+
 /// `error` with a suggestion of the intended option or command.
 fn suggested(mut error: clap::Error) -> clap::Error {
     let (invalid, suggestion) = match error.kind() {
@@ -289,6 +298,12 @@ fn suggested(mut error: clap::Error) -> clap::Error {
     // In the spelling of columns.
     let given = given.trim_start_matches('-').replace('-', "_");
     let program = Arguments::command();
+    if let Some((_, tip)) = NEEDLESS_OPTIONS.iter().find(|(option, _)| *option == given) {
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![(*tip).into()]));
+        error.remove(ContextKind::SuggestedArg);
+        error.remove(ContextKind::Usage);
+        return error;
+    }
     let meant = if invalid == ContextKind::InvalidSubcommand {
         nearest(&given, program.get_subcommands().map(clap::Command::get_name)).map(str::to_owned)
     } else {

@@ -67,7 +67,11 @@ pub fn report(audits: &[Audit]) -> String {
         let named = audit.worst.iter().take(failing.max(MIN_NAMED_COLUMNS));
         let named = named.map(|worst| (worst.column, units(worst.difference))).filter(|(_, units)| units != "0.000");
         let named: Vec<String> = named.map(|(column, units)| format!("{column} {units}")).collect();
-        let named = if named.is_empty() { "below 0.001".to_owned() } else { named.join(", ") };
+        let named = match named.is_empty() {
+            _ if audit.rows == 0 => "none".to_owned(),
+            true => "below 0.001".to_owned(),
+            false => named.join(", "),
+        };
         lines.push(vec![audit.table.clone(), words::count(audit.rows as u64), format!("{:e}", audit.rtol), named]);
     }
     let mut text = words::aligned(&lines, 0);

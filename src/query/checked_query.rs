@@ -16,7 +16,7 @@ use sqlparser::parser::{Parser, ParserError};
 use super::scan::Files;
 use super::units::{Columns, units};
 use super::walk::walk;
-use super::{QueryError, Source};
+use super::{Absent, QueryError, Source, Tables};
 use crate::names::hint;
 
 /// A valid query.
@@ -46,12 +46,12 @@ const GENERAL_HELP: &str =
     "correct the query; text goes in 'single quotes', names with special characters in \"double\" ones";
 
 impl CheckedQuery {
-    /// Parses and checks the query `sql` on the tables `sources`.
+    /// Parses and checks the query `sql` on these tables.
     ///
     /// # Errors
     ///
     /// What is wrong with the query, and how to correct it.
-    pub fn parse(sql: &str, sources: &[Source]) -> Result<CheckedQuery, QueryError> {
+    pub fn parse(sql: &str, opened: &Tables) -> Result<CheckedQuery, QueryError> {
         let statements = Parser::parse_sql(&GenericDialect {}, sql).map_err(|error| match error {
             ParserError::RecursionLimitExceeded => {
                 QueryError::sql("parentheses are nested too deeply", "simplify the query")
@@ -75,8 +75,9 @@ impl CheckedQuery {
                 _ => QueryError::sql(format!("{first} is refused: `query` reads and never writes"), "write one SELECT"),
             });
         };
+        let Tables { sources, absent } = opened;
         let [tables, read, windows] = Default::default();
-        let mut check = Check { sources, tables, read, windows, fault: None, mixed: None };
+        let mut check = Check { sources, absent, tables, read, windows, fault: None, mixed: None };
         walk(query.as_mut(), &mut check);
         if let Some(fault) = check.fault {
             return Err(fault);
@@ -94,6 +95,7 @@ impl CheckedQuery {
 /// The visitor that finds unsupported parts of a query.
 struct Check<'a> {
     sources: &'a [Source],
+    absent: &'a [Absent],
     /// Names of tables that the query defines itself.
     tables: HashSet<String>,
     /// Names of all tables in FROM.
@@ -244,6 +246,10 @@ impl VisitorMut for Check<'_> {
         if self.tables.contains(&word) || names.contains(&word.as_str()) {
             self.read.insert(word);
             return ControlFlow::Continue(());
+        }
+        if let Some(table) = self.absent.iter().find(|table| table.name == word) {
+            self.fault = Some(table.error());
+            return ControlFlow::Break(());
         }
         let help = hint(&word, names.iter().copied());
         self.refuse(format!("no table `{word}`\n  expected: {}", names.join(", ")), help)

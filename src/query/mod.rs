@@ -15,6 +15,7 @@ mod units;
 mod walk;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use polars::prelude::{IntoLazy, LazyFrame, PolarsError, PolarsResult, Schema};
 use polars::sql::SQLContext;
@@ -32,6 +33,30 @@ pub use source::Source;
 pub struct Tables {
     /// The tables, in the order of the dataset.
     pub sources: Vec<Source>,
+    /// The tables of the dataset that cannot be read.
+    pub absent: Vec<Absent>,
+}
+
+/// A table without a computed part, or with a damaged one.
+pub struct Absent {
+    /// Its name.
+    pub name: String,
+    fault: Option<Arc<DatasetError>>,
+}
+
+impl Absent {
+    /// Whether one of its parts is damaged.
+    pub fn is_damaged(&self) -> bool {
+        self.fault.is_some()
+    }
+
+    /// Why it cannot be read.
+    pub fn error(&self) -> QueryError {
+        match &self.fault {
+            Some(fault) => QueryError::Part(fault.clone()),
+            None => QueryError::sql(format!("`{}` has no parts yet", self.name), "compute them with `slipsweep run`"),
+        }
+    }
 }
 
 /// The error of a query.
@@ -46,7 +71,7 @@ pub enum QueryError {
     Sql { found: String, help: String },
     /// A part is damaged, or belongs to another dataset.
     #[error(transparent)]
-    Part(Box<DatasetError>),
+    Part(Arc<DatasetError>),
     /// A file cannot be read.
     #[error(
         "{path}: cannot read: {source}\n  help: if a run wrote it, run the sweep again; it recomputes damaged parts"
@@ -78,13 +103,17 @@ fn plan<'a>(tables: impl IntoIterator<Item = (&'a str, LazyFrame)>, sql: &str) -
 }
 
 impl Tables {
+    fn of(source: Source) -> Tables {
+        Tables { sources: vec![source], absent: Vec::new() }
+    }
+
     /// Opens the tables of the dataset in `path`. A folder of Parquet files, or a Parquet or CSV file, is one table under its name.
     ///
     /// # Errors
     ///
     /// If there is no table, or if one of its files cannot be read.
     pub fn open(path: &Path) -> Result<Tables, QueryError> {
-        source::open(path).map(|sources| Tables { sources })
+        source::open(path)
     }
 
     /// The answer to a SQL query, computed when it is read.
@@ -93,8 +122,8 @@ impl Tables {
     ///
     /// If the query is not one SELECT from these tables.
     pub fn query(&self, sql: &str) -> Result<Answer, QueryError> {
-        let checked = CheckedQuery::parse(sql, &self.sources)?;
-        let planned = || -> PolarsResult<(LazyFrame, std::sync::Arc<Schema>)> {
+        let checked = CheckedQuery::parse(sql, self)?;
+        let planned = || -> PolarsResult<(LazyFrame, Arc<Schema>)> {
             let tables = self.sources.iter().map(|source| (source.name.as_str(), source.frame.clone()));
             let mut frame = plan(tables, &checked.query.to_string())?;
             let schema = frame.collect_schema()?;
@@ -120,7 +149,7 @@ impl Tables {
     /// The error of a query that failed during its computation, if the query is to blame: it also fails on the first rows alone, such as a sum
     /// of words. Otherwise `None`.
     pub fn diagnose(&self, sql: &str) -> Option<QueryError> {
-        let checked = CheckedQuery::parse(sql, &self.sources).ok()?;
+        let checked = CheckedQuery::parse(sql, self).ok()?;
         let mut first = Vec::new();
         for source in &self.sources {
             first.push((source.name.as_str(), source.frame.clone().limit(1).collect().ok()?.lazy()));

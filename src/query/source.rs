@@ -3,13 +3,14 @@
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult};
 use polars_io::SerReader;
 use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 
 use super::scan::Files;
-use super::{Answer, QueryError};
+use super::{Absent, Answer, QueryError, Tables};
 use crate::dataset::Folder;
 use crate::dataset::frame::{self, FrameError};
 use crate::sweep::path_hint;
@@ -42,7 +43,7 @@ const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parq
 /// # Errors
 ///
 /// A path without tables, or a file that cannot be read.
-pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
+pub fn open(path: &Path) -> Result<Tables, QueryError> {
     let wrong = |found: &str, help: &str| QueryError::Path {
         path: path.display().to_string(),
         found: found.to_owned(),
@@ -54,10 +55,10 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
             && let Ok(Some(_)) = Folder::at(&above).manifest()
         {
-            let mut sources = open(&above)?;
-            sources.retain(|source| *source.name == *name.to_string_lossy());
-            if !sources.is_empty() {
-                return Ok(sources);
+            let mut tables = open(&above)?;
+            tables.sources.retain(|source| *source.name == *name.to_string_lossy());
+            if !tables.sources.is_empty() {
+                return Ok(tables);
             }
         }
         let folder = Folder::at(path);
@@ -70,20 +71,24 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
                     "name a folder that `slipsweep run` wrote",
                 ));
             }
-            return Source::parquet(path, name_of(path), files, 0, None).map(|source| vec![source]);
+            return Source::parquet(path, name_of(path), files, 0, None).map(Tables::of);
         };
-        let mut sources = Vec::new();
+        let (mut sources, mut absent) = (Vec::new(), Vec::new());
         for table in &manifest.tables {
-            let verified = folder.verified(&manifest, table);
-            let (files, missing) = verified.map_err(|fault| QueryError::Part(Box::new(fault)))?;
-            if !files.is_empty() {
-                sources.push(Source::parquet(path, table.name.clone(), files, missing, Some(table.rows))?);
+            let name = table.name.clone();
+            match folder.verified(&manifest, table) {
+                Ok((files, _)) if files.is_empty() => absent.push(Absent { name, fault: None }),
+                Ok((files, missing)) => sources.push(Source::parquet(path, name, files, missing, Some(table.rows))?),
+                Err(fault) => absent.push(Absent { name, fault: Some(Arc::new(fault)) }),
             }
         }
         if sources.is_empty() {
+            if let Some(damaged) = absent.iter().find(|table| table.fault.is_some()) {
+                return Err(damaged.error());
+            }
             return Err(wrong("the dataset has no parts yet", "compute them with `slipsweep run`"));
         }
-        return Ok(sources);
+        return Ok(Tables { sources, absent });
     }
     if !path.exists() {
         return Err(wrong("there is no such file or folder", &path_hint(path, "")));
@@ -97,7 +102,7 @@ pub fn open(path: &Path) -> Result<Vec<Source>, QueryError> {
         Some("csv") => Source::csv(path),
         _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
     }
-    .map(|source| vec![source])
+    .map(Tables::of)
 }
 
 impl Source {

@@ -68,8 +68,12 @@ pub struct Request {
     pub sizes: Vec<f64>,
 }
 
-/// Help for a path that cannot be read: the nearest name with this ending in the same folder, if any.
+/// Help for a path that cannot be read: the dataset of this name, or the nearest name with this ending in the same folder, if any.
 pub fn path_hint(path: &Path, ending: &str) -> String {
+    let dataset = Path::new("results").join(path);
+    if ending.is_empty() && dataset.is_dir() {
+        return format!("did you mean `{}`?", dataset.display());
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();

@@ -67,6 +67,14 @@ const MISSING_COMMA: &str = "write a comma between two values, or `]` after the 
 const NUMBER_ALONE: &str =
     "write the number alone; it is in SI units, such as m/s, if [model] has `units = \"si\"` and the scales";
 
+/// The help for a word that means no value.
+const NO_BOUND: &str = "write inf for no bound, as in v_ceiling = inf; or leave the key out";
+
+/// Whether a word means no value in other formats.
+fn is_no_value(word: &str) -> bool {
+    ["none", "null", "nil", "no", "off", "infinity", "unlimited"].contains(&word.to_lowercase().as_str())
+}
+
 /// The help for a line that is not TOML.
 fn help_for_line(line: &str) -> &'static str {
     let value = line.split_once('=').map_or(line, |(_, value)| value).trim();
@@ -81,6 +89,10 @@ fn help_for_line(line: &str) -> &'static str {
         "write straight quotes, \""
     } else if has_decimal_comma {
         "write a decimal point, not a comma"
+    } else if is_no_value(value) {
+        NO_BOUND
+    } else if line.trim_start().starts_with("where") {
+        "write the condition in quotes: where = \"t_f > 3\""
     } else if value.contains("space(") {
         "write a range as { linspace = [first, last, count] } or { geomspace = [first, last, count] }"
     } else if value.starts_with(['[', '{']) && lacks_comma {
@@ -107,6 +119,8 @@ pub fn help_for_word(word: &str) -> String {
         !name.is_empty() && unit.len() < word.len() && (name.len() == 1 || Quantity::from_name(name).is_none());
     if word.parse::<f64>().is_ok() {
         "remove the quotes".to_owned()
+    } else if is_no_value(word) {
+        NO_BOUND.to_owned()
     } else if is_unit {
         NUMBER_ALONE.to_owned()
     } else if word.contains(['*', '/', '+', '('])
@@ -192,12 +206,24 @@ impl Entry<'_> {
     ) -> Option<()> {
         let DeValue::Table(table) = self.value else { return self.wrong("a table", faults) };
         let prefix = if self.key.is_empty() { String::new() } else { format!("{}.", self.key) };
+        let takes_axes = known.contains(&"axes");
+        let mut has_stray_axes = false;
         for (name, value) in table {
             let (start, name) = (name.span().start, name.get_ref().as_ref());
             let key = format!("{prefix}{name}");
             let entry = Entry { key: &key, start, value: value.get_ref(), ..self };
             if known.is_empty() || known.contains(&name) {
                 take(name, entry, faults);
+            } else if takes_axes && Quantity::from_name(name).is_some() {
+                // The header is missing: one fault for all axes.
+                if !has_stray_axes {
+                    has_stray_axes = true;
+                    faults.suspect(format!("{prefix}axes"));
+                    let header = if prefix.is_empty() { "[axes]" } else { "[block.axes]" };
+                    let found = format!("the axis `{name}` is not below {header}");
+                    let help = format!("write the line {header} above the first axis");
+                    entry.fault(SpecError::new(key.clone(), found, format!("{header} before the axes"), help), faults);
+                }
             } else {
                 let meant = nearest(name, known.iter().copied());
                 meant.into_iter().for_each(|meant| faults.suspect(format!("{prefix}{meant}")));

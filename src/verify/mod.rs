@@ -135,6 +135,11 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
         audits.push(audit);
     }
+    if audits.iter().all(|audit| audit.rows == 0 && !audit.unchecked.is_empty()) {
+        return Err(VerifyError(
+            "no part of the sample is there\n  help: compute the parts with `slipsweep run`".to_owned(),
+        ));
+    }
     Ok(audits)
 }
 

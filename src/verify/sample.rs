@@ -35,7 +35,7 @@ pub fn rows(
     seed: u64,
 ) -> Result<(Vec<(u64, Row)>, u64), String> {
     let chosen = choose(table.rows, count, seed);
-    let (mut found, mut missing, mut first_missing) = (Vec::new(), 0, None);
+    let (mut found, mut missing) = (Vec::new(), 0);
     let numbers: BTreeSet<u64> = chosen.iter().map(|row| row / table.rows_per_part.max(1)).collect();
     for part in numbers {
         let range = table.rows_of(part);
@@ -46,7 +46,6 @@ pub fn rows(
             State::There { .. } | State::Damaged { .. } | State::Foreign { what: PROGRAM, .. } => {}
             State::Missing => {
                 missing += inside.len() as u64;
-                first_missing.get_or_insert(path);
                 continue;
             }
             fault => return Err(folder.fault(&path, fault).to_string()),
@@ -57,11 +56,5 @@ pub fn rows(
         }
         found.extend(inside.iter().map(|row| (row + range.start, frame.row(*row as usize))));
     }
-    match first_missing {
-        Some(path) if found.is_empty() => Err(format!(
-            "{}: part is missing\n  help: run the sweep again, which makes only what is missing",
-            path.display()
-        )),
-        _ => Ok((found, missing)),
-    }
+    Ok((found, missing))
 }

@@ -55,6 +55,36 @@ fn summary_repeats_the_report_of_the_run() {
     }
 }
 
+/// A table without parts, or with a damaged one, keeps no other table from being read.
+#[test]
+fn the_tables_that_are_there_are_read() {
+    let folder = small();
+    let part = |table: &str| folder.path().join(format!("results/test/{table}/part-000000.parquet"));
+    fs::remove_file(part("optimal")).expect("is there");
+    let output = slipsweep(folder.path(), &["head", "results/test"]);
+    assert_eq!(output.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&output.stdout).starts_with("best_cubic: "));
+    let note = "note: `optimal` has no parts yet; `slipsweep run` computes them\n";
+    assert_eq!(String::from_utf8_lossy(&output.stderr), note);
+    let message = "error: `optimal` has no parts yet\n  help: compute them with `slipsweep run`\n".to_owned();
+    assert_eq!(refused(folder.path(), &["head", "results/test", "optimal"]), (1, message.clone()));
+    assert_eq!(refused(folder.path(), &["query", "results/test", "SELECT * FROM optimal"]), (1, message));
+    let query = ["query", "results/test", "SELECT count(*) AS n FROM best_cubic"];
+    assert_eq!(printed(folder.path(), &query), "n\n3\n");
+
+    fs::write(part("optimal"), "PAR1").expect("is writable");
+    let output = slipsweep(folder.path(), &["head", "results/test"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stdout).starts_with("best_cubic: "));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("optimal/part-000000.parquet"));
+    assert_eq!(refused(folder.path(), &["query", "results/test", "SELECT * FROM optimal"]).0, 2);
+    assert_eq!(printed(folder.path(), &query), "n\n3\n");
+
+    // The name of a dataset without its folder.
+    let (code, message) = refused(folder.path(), &["head", "test"]);
+    assert!(code == 1 && message.ends_with("did you mean `results/test`?\n"), "{message}");
+}
+
 #[test]
 fn summaries_state_units() {
     let expected = "\

@@ -232,6 +232,16 @@ fn the_parts_that_are_there_are_audited() {
     let output = verify(folder.path(), &["--sample", "30"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     assert!(text(&output).contains("their part is missing"), "{}", text(&output));
+
+    // Nor does a table without any part keep the others from being checked.
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), AXES, "[tables.optimal]\n[tables.crossover]\n"), folder.path(), 1);
+    fs::remove_file(Folder::new(folder.path(), "test").part("optimal", 0)).expect("is there");
+    let output = verify(folder.path(), &[]);
+    let text = text(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(text.contains("\noptimal ") && text.contains("\ncrossover "), "{text}");
+    assert!(text.contains("their part is missing") && text.contains(" none\n"), "{text}");
 }
 
 #[test]
@@ -244,7 +254,7 @@ fn a_folder_without_a_dataset_is_refused() {
     let output = verify(folder.path(), &[]);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("part is missing") && message.contains("run the sweep again"), "{message}");
+    assert!(message.contains("no part of the sample is there") && message.contains("`slipsweep run`"), "{message}");
 }
 
 /// Steps that settle, and that end on limit cycles, with the shortcut and the optimum on the same springs.
