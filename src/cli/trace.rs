@@ -290,6 +290,8 @@ struct Origin {
     dataset: String,
     table: String,
     row: u64,
+    /// Whether the status of the row is infeasible.
+    is_infeasible: bool,
 }
 
 /// Traces a protocol.
@@ -360,11 +362,6 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
         facts.extend(effects.facts());
     }
     Ok(Traced { header, trace, units: request.units, facts })
-}
-
-fn absent(protocol: &str, absence: Absence) -> Failure {
-    let code = if absence.is_defect() { EXIT_FAILURE } else { EXIT_REQUEST };
-    Failure { code, message: format!("error: no `{protocol}` protocol: {absence}") }
 }
 
 /// Relative accuracy without a row of a table: the default of a spec.
@@ -442,9 +439,22 @@ impl Arguments {
         })
     }
 
+    /// The failure for a protocol that does not exist.
+    fn absent(&self, request: &TraceRequest, absence: &Absence) -> Failure {
+        let code = if absence.is_defect() { EXIT_FAILURE } else { EXIT_REQUEST };
+        let Some(Origin { table, row, .. }) = &request.origin else {
+            return Failure { code, message: format!("error: no `{}` protocol: {absence}", request.name) };
+        };
+        // The help names options of a protocol.
+        let reason = absence.to_string();
+        let reason = reason.lines().next().unwrap_or_default();
+        let note = if request.units == Units::Scaled { "" } else { " (dimensionless)" };
+        Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}{note}", self.subject) }
+    }
+
     /// The protocol, its trace, and the effects of a disturbance if one is requested.
     fn traced(&self, request: &TraceRequest) -> Result<(TracedPath, Trace, Option<Effects>), Failure> {
-        let absent = |absence| absent(&request.name, absence);
+        let absent = |absence| self.absent(request, &absence);
         let times = self.points.map_or(Times::Fewest, |count| Times::Spaced(count as usize));
         let of = |motion: &dyn Motion| {
             let trace = Trace::of(motion, &request.case.transition, times);
@@ -452,6 +462,10 @@ impl Arguments {
         };
         let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
+            if request.origin.as_ref().is_some_and(|origin| origin.is_infeasible) {
+                let reason = "its status is infeasible: the optimum that it is compared with does not exist";
+                return Err(wrong(reason));
+            }
             let trace = of(&*path.motion)?;
             return Ok((path, trace, None));
         };
@@ -605,6 +619,8 @@ impl Arguments {
             Cell::Word(word) if name == Quantity::Law.name() => StateLaw::find(word),
             _ => None,
         });
+        let infeasible = Cell::Word(Status::Infeasible.name().to_owned());
+        let is_infeasible = written.iter().any(|(name, cell)| name == table::STATUS && *cell == infeasible);
         Ok(TraceRequest {
             bounded: trace::has_floor(name, friction).then_some(bounded),
             name: protocol_name,
@@ -615,7 +631,7 @@ impl Arguments {
             friction,
             rtol: self.rtol.unwrap_or(own),
             units,
-            origin: Some(Origin { dataset: manifest.name.clone(), table: name.to_owned(), row: number }),
+            origin: Some(Origin { dataset: manifest.name.clone(), table: name.to_owned(), row: number, is_infeasible }),
         })
     }
 }
@@ -802,7 +818,7 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
         text.push_str(", without the velocity floor v >= 1");
     }
     text.push('\n');
-    if let Some(Origin { dataset, table, row }) = &request.origin {
+    if let Some(Origin { dataset, table, row, .. }) = &request.origin {
         text.push_str(&format!("  row {row} of table {table} of {dataset}\n"));
     }
     for (parameter, doc) in parameters(request, path) {
@@ -865,7 +881,7 @@ fn facts(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace
     facts.extend(request.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
     facts.extend(arguments.points.map(|points| ("points", points.to_string())));
     facts.push(("status", path.status.name().to_owned()));
-    if let Some(Origin { dataset, table, row }) = &request.origin {
+    if let Some(Origin { dataset, table, row, .. }) = &request.origin {
         facts.extend([("dataset", dataset.clone()), ("table", table.clone()), ("row", row.to_string())]);
     }
     facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()

@@ -175,63 +175,44 @@ impl<'a> Coefficients<'a> {
         self.first + self.order.map_or(place as u64, |order| order[place].into())
     }
 
-    /// The coefficients at `places`, all of one duration.
-    fn fill(&self, places: Range<usize>, t_f: f64, out: &mut Scaled) {
-        for (i, Words { high, low }) in out.0.iter_mut().enumerate() {
-            high.clear();
-            low.clear();
+    /// `alpha_2 t_f` and `alpha_3 t_f^2` at `places`, all of one duration, in double precision.
+    fn fill(&self, places: Range<usize>, t_f: f64, out: [&mut Vec<f64>; 2]) {
+        for (i, out) in out.into_iter().enumerate() {
+            out.clear();
             let Some(runs) = &self.runs[i] else { continue };
             let values = runs.values();
             match self.order {
                 None => {
                     let rows = self.first + places.start as u64..self.first + places.end as u64;
                     for (value, length) in runs.over(rows) {
-                        high.resize(high.len() + length, values[value]);
+                        out.resize(out.len() + length, values[value]);
                     }
                 }
-                Some(order) => high.extend(
+                Some(order) => out.extend(
                     order[places.clone()].iter().map(|&offset| values[runs.step_of(self.first + u64::from(offset))]),
                 ),
             }
             if self.natural[i] {
-                let time = DoubleDouble::new(t_f);
-                let unit = if i == 0 { time } else { time * time } / DoubleDouble::new(self.sizes[i]);
-                low.extend(high.iter_mut().map(|value| {
-                    let scaled = DoubleDouble::new(*value) * unit;
-                    *value = scaled.high;
-                    scaled.low
-                }));
+                let unit = self.unit(i, t_f).high;
+                out.iter_mut().for_each(|value| *value *= unit);
             }
         }
     }
-}
 
-/// `alpha_2 t_f` and `alpha_3 t_f^2` of consecutive places.
-#[derive(Default)]
-struct Scaled([Words; 2]);
-
-/// One scaled coefficient of consecutive places.
-#[derive(Default)]
-struct Words {
-    high: Vec<f64>,
-    /// What the rounding of the product with `t_f` lost; empty if there was no product.
-    low: Vec<f64>,
-}
-
-impl Scaled {
-    fn high(&self) -> [&[f64]; 2] {
-        [&self.0[0].high, &self.0[1].high]
+    /// What turns a coefficient in natural units into that relative to the duration.
+    fn unit(&self, i: usize, t_f: f64) -> DoubleDouble {
+        let time = DoubleDouble::new(t_f);
+        let power = if i == 0 { time } else { time * time };
+        power / DoubleDouble::new(self.sizes[i])
     }
 
-    /// The places at which rounding lost something, with the coefficients to 32 digits.
-    fn rounded(&self) -> impl Iterator<Item = (usize, [DoubleDouble; 2])> {
-        let count = self.0.iter().map(|words| words.low.len()).max().unwrap_or(0);
-        let word = |words: &Words, i: usize| DoubleDouble {
-            high: words.high[i],
-            low: words.low.get(i).copied().unwrap_or(0.0),
-        };
-        let at = move |i: usize| [word(&self.0[0], i), word(&self.0[1], i)];
-        (0..count).map(move |i| (i, at(i))).filter(|(_, place)| place.iter().any(|a| a.low != 0.0))
+    /// `alpha_2 t_f` and `alpha_3 t_f^2` at a place, to 32 digits.
+    fn exact(&self, place: usize, t_f: f64) -> [DoubleDouble; 2] {
+        [0, 1].map(|i| {
+            let value = self.runs[i].as_ref().map_or(0.0, |runs| runs.values()[runs.step_of(self.row(place))]);
+            let value = DoubleDouble::new(value);
+            if self.natural[i] { value * self.unit(i, t_f) } else { value }
+        })
     }
 }
 
@@ -294,7 +275,8 @@ fn evaluate(
 ) -> RunStats {
     let RowChunk { first_group, mut place, mut cells } = chunk;
     cells.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
-    let mut scaled = Scaled::default();
+    let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
+    let is_rounded = coefficients.natural.contains(&true);
     let (mut work_buffer, mut v_min_buffer, mut error_buffer) = (Vec::new(), Vec::new(), Vec::new());
     let mut work = RunStats::default();
     for group in &groups[first_group..] {
@@ -307,8 +289,8 @@ fn evaluate(
         cells = later;
         let point = job.grid.scaled(&coefficients.view.point(group.row));
         let prepared = group.prepared.get_or_init(|| prepare(job, group, &point, &mut work));
-        coefficients.fill(place..place + length, point[Quantity::Time], &mut scaled);
-        let [a_2, a_3] = scaled.high();
+        let (t_f, first) = (point[Quantity::Time], place);
+        coefficients.fill(place..place + length, t_f, [&mut a_2, &mut a_3]);
         place += length;
 
         let Some(landscape) = &prepared.landscape else {
@@ -321,25 +303,26 @@ fn evaluate(
         let works = if work_s.is_empty() && with_work { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
         let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
-        work += RunStats::from(landscape.evaluate(a_2, a_3, out));
+        work += RunStats::from(landscape.evaluate(&a_2, &a_3, out));
         if job.friction == Friction::Regularised {
             let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
-            work += RunStats::from(landscape.regularise(a_2, a_3, job.rtol, out));
+            work += RunStats::from(landscape.regularise(&a_2, &a_3, job.rtol, out));
         }
         let errors = if work_error.is_empty() { buffer(&mut error_buffer, length) } else { work_error };
         if let Some((finest, transition, t_f)) = &prepared.finest {
             let mut again = now.status.to_vec();
             let out = LandscapeBuffers { work: &mut *errors, v_min: &mut [], status: &mut again };
-            work += RunStats::from(finest.evaluate(a_2, a_3, out));
+            work += RunStats::from(finest.evaluate(&a_2, &a_3, out));
             for ((error, &work_s), &v_min) in errors.iter_mut().zip(&*works).zip(&*v_min) {
                 *error = error::of_shortcut(transition, *t_f, v_min, work_s, *error);
             }
         }
-        landscape.greatest_velocities(a_2, a_3, now.status, v_max);
-        for (i, place) in scaled.rounded() {
-            if !landscape.needs_low_words(place, v_min[i]) {
+        landscape.greatest_velocities(&a_2, &a_3, now.status, v_max);
+        for i in (0..length).filter(|_| is_rounded) {
+            if !landscape.depends_on_rounding([a_2[i], a_3[i]], now.status[i], v_min[i]) {
                 continue;
             }
+            let place = coefficients.exact(first + i, t_f);
             let mut stats = SolverStats::default();
             let mut point = |of: &Landscape, rtol| of.point(place, job.friction, rtol, &mut stats);
             let exact = point(landscape, job.rtol).unwrap_or(CubicPoint::INFEASIBLE);

@@ -49,9 +49,6 @@ pub fn protocol_of(
         _ => None,
     };
     match word(STATUS) {
-        Some(status) if status == Status::Infeasible.name() => {
-            return Err(Pathless::Status("its status is infeasible: there is no such protocol"));
-        }
         Some(status) if status == Status::NotConverged.name() => {
             return Err(Pathless::Status("its status is not_converged: the solver could not certify its answer"));
         }

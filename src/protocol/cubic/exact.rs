@@ -4,6 +4,7 @@
 
 use super::{Landscape, Path};
 use crate::model::{Friction, StateLaw};
+use crate::numerics::cubic::Cubic;
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::{SolverStats, Status};
 
@@ -30,22 +31,24 @@ impl CubicPoint {
 const ROUNDING_SHARE: f64 = 0.5;
 
 impl Landscape {
-    /// Whether the low words of the coefficients matter: they change theta by up to `|low_2| + |low_3|` and `n` by up to three times as much. The
-    /// bound `v = 1` is decided with all digits.
-    pub fn needs_low_words(&self, [a_2, a_3]: [DoubleDouble; 2], v_min: f64) -> bool {
-        let change = a_2.low.abs() + a_3.low.abs();
-        if change == 0.0 {
-            return false;
+    /// Whether a relative error of `f64::EPSILON` of both coefficients matters to a shortcut of this `status` and `v_min`: it changes theta by up to
+    /// `EPSILON (|a_2| + |a_3|)` and `n` by up to three times as much. The bound `v = 1` is decided with all digits.
+    #[inline]
+    pub fn depends_on_rounding(&self, [a_2, a_3]: [f64; 2], status: Status, v_min: f64) -> bool {
+        let path = Path::new(&self.ends, a_2, a_3);
+        let change = f64::EPSILON * (a_2.abs() + a_3.abs());
+        let doubt = |cubic: &Cubic, slack: f64| cubic.doubt() + slack * (path.slack() + change);
+        let [of_theta, of_n] = [doubt(&path.theta, 1.0), doubt(&path.n, 3.0)];
+        if status == Status::Infeasible {
+            return path.n.bounds().1 > -of_n && path.n.least() > -of_n && path.theta.least() > -of_theta;
         }
-        let path = Path::new(&self.ends, a_2.high, a_3.high);
-        let relative = |theta: f64, n: f64| {
-            let (theta, n) = (theta - path.slack(), n - 3.0 * path.slack());
-            if theta > 0.0 && n > 0.0 { change / theta + 3.0 * change / n } else { f64::INFINITY }
-        };
         let tolerance = ROUNDING_SHARE * self.ends.v_loss;
-        let matters = relative(path.theta.bounds().0, path.n.bounds().0) > tolerance
-            && relative(path.theta.least(), path.n.least()) > tolerance;
-        matters || (v_min - 1.0).abs() <= tolerance
+        let matters = |theta: f64, n: f64| {
+            let (theta, n) = (theta - of_theta, n - of_n);
+            theta <= 0.0 || n <= 0.0 || change * (n + 3.0 * theta) > tolerance * theta * n
+        };
+        matters(path.theta.bounds().0, path.n.bounds().0) && matters(path.theta.least(), path.n.least())
+            || (v_min - 1.0).abs() <= tolerance
     }
 
     /// The shortcut with `alpha_2 t_f = a_2` and `alpha_3 t_f^2 = a_3` under a form of friction, its work good to `rtol`; `None` if it is
