@@ -522,6 +522,15 @@ fn single_materials_are_symbols_of_their_outcome() {
     assert!(!svg.contains("<image") && !words.contains("no row"), "{words}");
 }
 
+/// Maps of stiffness over mass show the critical stiffness, as those over the final velocity do.
+#[test]
+fn regress_maps_over_mass_show_the_critical_stiffness() {
+    let spec = "[axes]\na = 0.005\nb = 0.01\nv_i = 1e5\nv_f = 1e6\nk = { geomspace = [1e-3, 1e-1, 5] }\n\
+                m = { geomspace = [1e-17, 1e-14, 5] }\n[tables.step_response]\n";
+    let (map, svg) = picture("mass", spec, "step_response");
+    assert!(svg.contains("<image") && map.contains("\nkc(vf)\n"), "{map}");
+}
+
 /// Lines over an axis are named by the labels of their points, also on request.
 #[test]
 fn regress_a_label_as_colour_names_lines() {
