@@ -464,6 +464,18 @@ fn the_map_of_optima_shows_the_strategy_and_when_it_changes() {
     assert!(same.contains("W* (μ0 σ l)") && !same.contains("speed up"), "{same}");
 }
 
+/// Small gaps of the colour bar need powers of ten, durations and velocities do not.
+#[test]
+fn regress_each_axis_has_its_own_form_of_numbers() {
+    let spec = "[axes]\nt_f = { geomspace = [0.002, 0.1, 13] }\na = 0.03\nb = 0.05\nv_i = 3.0\n\
+                v_f = { geomspace = [3.3, 200.0, 13] }\n[tables.best_cubic]\n";
+    let (map, _) = picture("forms", spec, "best_cubic");
+    for part in ["\n0.003\n", "\n0.03\n", "\n30\n", "\n10−6\n"] {
+        assert!(map.contains(part), "{part} in {map}");
+    }
+    assert!(!map.contains('×'), "{map}");
+}
+
 #[test]
 fn gaps_below_zero_have_a_colour_of_their_own() {
     let folder = tempfile::tempdir().expect("a folder");
