@@ -560,3 +560,25 @@ fn regress_a_label_as_colour_names_lines() {
     let words = words(&plain);
     assert!(read(folder, "lines.svg") == plain && words.contains("granite") && words.contains("quartz"), "{words}");
 }
+
+/// A second axis that distinguishes lines is stated after the label; a label that all lines share is in the subtitle.
+#[test]
+fn regress_labels_stay_in_the_legend_when_another_axis_varies() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let folder = folder.path();
+    fs::write(folder.join("points.csv"), "material,a,b\nquartz,0.02,0.03\ngranite,0.01,0.015\n").expect("is writable");
+    let spec = "name = \"labels\"\npoints = \"points.csv\"\n[axes]\nt_f = [0.02, 0.05, 0.1]\nv_i = 3.0\n\
+                v_f = [50.0, 100.0]\n[tables.optimal]\n";
+    fs::write(folder.join("labels.toml"), spec).expect("is writable");
+    shown(folder, &["run", "labels.toml", "--quiet"]);
+    let lines = ["plot", "results/labels", "--x", "t_f", "--y", "work", "--table", "optimal", "--out", "lines.svg"];
+    shown(folder, &lines);
+    let both = words(&read(folder, "lines.svg"));
+    for part in ["quartz, vf = 50 v0", "quartz, vf = 100 v0", "granite, vf = 50 v0", "granite, vf = 100 v0"] {
+        assert!(both.contains(&format!("\n{part}\n")), "{part} in {both}");
+    }
+    assert!(!both.contains("a = "), "{both}");
+    shown(folder, &[&lines[..], &["--where", "material=granite"]].concat());
+    let one = words(&read(folder, "lines.svg"));
+    assert!(one.contains(", granite\n") && one.contains("\nvf = 50 v0\n"), "{one}");
+}
