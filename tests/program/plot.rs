@@ -111,7 +111,8 @@ fn every_table_has_its_picture() {
     for (table, svg) in tables.iter().zip(&all) {
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{table}");
     }
-    let words: Vec<String> = all.iter().map(|svg| words(svg)).collect();
+    let words_of = words;
+    let words: Vec<String> = all.iter().map(|svg| words_of(svg)).collect();
     assert!(words.iter().all(|words| !words.contains("NaN")));
     for part in
         ["Work gap of the cubic shortcuts", "infeasible", "vmin = 1", "best shortcut", "α2 tf", "α3 tf2", "tf = 0.02"]
@@ -121,6 +122,11 @@ fn every_table_has_its_picture() {
     assert!(words[2].contains("W* (μ0 σ l)"), "{}", words[2]);
     assert!(words[4].contains("vi = 3 v0, tf = 0.02 l/v0"), "{}", words[4]);
     assert!(words[4].contains("\nbounded friction, τceiling = 1.1 μ0 σ"), "{}", words[4]);
+    // A step costs little because it does not arrive.
+    let note = "The step only approaches the final state";
+    assert!(words[4].contains(note), "{}", words[4]);
+    shown(folder, &["plot", "results/small", "--table", "shortcut", "--where", "family!=step", "--out", "arrived.svg"]);
+    assert!(!words_of(&read(folder, "arrived.svg")).contains(note));
     // Scaled figures state their units too; nothing in a figure is for the command line.
     assert!(words[0].contains("a = 0.03 μ0, b = 0.05 μ0, vi = 3 v0"), "{}", words[0]);
     assert!(words.iter().all(|words| !words.contains("--")));
