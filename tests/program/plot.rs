@@ -500,6 +500,17 @@ fn gaps_below_zero_have_a_colour_of_their_own() {
     }
 }
 
+/// The best shortcut lies on the grid: its gap is rounding, and the next gap is seven decades above. The colour bar starts there.
+#[test]
+fn regress_gaps_that_are_rounding_do_not_stretch_the_colours() {
+    let spec = "[axes]\nt_f = 0.002\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 4.0\n\
+                alpha_2 = { linspace = [-0.1251150175, -0.0451150175, 21], unit = \"1/t_f\" }\n\
+                alpha_3 = { linspace = [-0.03821242107, 0.04178757893, 21], unit = \"1/t_f^2\" }\n[tables.gap]\n";
+    let (map, _) = picture("rounding", spec, "gap");
+    assert!(map.contains("\n10−5\n") && !map.contains("10−8"), "{map}");
+    assert!(map.contains("Gaps below rtol = 10−10, which are rounding, have the darkest colour."), "{map}");
+}
+
 #[test]
 fn reduced_landscapes_have_pictures_of_their_own() {
     let spec = |reduce: &str| {
