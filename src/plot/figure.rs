@@ -291,9 +291,8 @@ impl Figure {
         if !self.legend.is_empty() {
             top = self.draw_legend(&mut canvas, top, inner);
         }
-        let as_powers = self.as_powers();
-        let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width(as_powers));
-        let (mut foot, maps) = self.draw_panels(&mut canvas, top, inner - bar - self.row_title_width(), as_powers);
+        let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width());
+        let (mut foot, maps) = self.draw_panels(&mut canvas, top, inner - bar - self.row_title_width());
         for note in &self.notes {
             foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
         }
@@ -329,21 +328,15 @@ impl Figure {
         if self.rows.is_empty() { 0.0 } else { ROW_TITLE_WIDTH }
     }
 
-    /// Whether logarithmic ticks are powers of ten, in all panels alike.
-    fn as_powers(&self) -> bool {
-        let axes = self.panels.iter().flat_map(|panel| [panel.x.scale, panel.y.scale]);
-        axes.chain(self.colours.iter().map(|colours| colours.scale)).any(|scale| scale.needs_powers())
-    }
-
     /// The layout of the panels in a width of `inner` points.
-    fn layout(&self, inner: f64, as_powers: bool) -> Layout {
+    fn layout(&self, inner: f64) -> Layout {
         let most = if self.rows.is_empty() { (inner / MIN_PANEL_WIDTH) as usize } else { usize::MAX };
         let columns = self.columns.min(most).clamp(1, self.panels.len().max(1));
         // A first guess of a panel's width determines the number of ticks, and so the space for their labels.
         let guess = inner / columns as f64 - 40.0;
         let ticks = |(place, panel): (usize, &Panel)| PanelTicks {
-            x: panel.x.scale.ticks(fitting(guess, if panel.x.scale.log { 27.0 } else { 30.0 }), as_powers),
-            y: panel.y.scale.ticks(fitting(guess * self.aspect, 17.0), as_powers),
+            x: panel.x.scale.ticks(fitting(guess, if panel.x.scale.log { 27.0 } else { 30.0 })),
+            y: panel.y.scale.ticks(fitting(guess * self.aspect, 17.0)),
             x_label: self.panels.get(place + columns).is_none_or(|below| below.x != panel.x),
             y_label: place.is_multiple_of(columns),
         };
@@ -374,14 +367,8 @@ impl Figure {
     }
 
     /// Draws the panels and the colour bar; returns their lower edge, and the maps.
-    fn draw_panels(
-        &self,
-        canvas: &mut Canvas,
-        top: f64,
-        inner: f64,
-        as_powers: bool,
-    ) -> (f64, Vec<(Area, &Panel, &Hover)>) {
-        let layout = self.layout(inner, as_powers);
+    fn draw_panels(&self, canvas: &mut Canvas, top: f64, inner: f64) -> (f64, Vec<(Area, &Panel, &Hover)>) {
+        let layout = self.layout(inner);
         let Layout { width, height, .. } = layout;
         let columns = layout.lefts.len();
         let mut y = top;
@@ -409,7 +396,7 @@ impl Figure {
             let first = top + layout.aboves.first().copied().unwrap_or(0.0);
             let tall = y - layout.belows.last().copied().unwrap_or(0.0) - first;
             let x = MARGIN + inner + self.row_title_width() + BAR_SPACE;
-            colours.draw(canvas, Area { x, y: first, width: BAR_WIDTH, height: tall }, as_powers);
+            colours.draw(canvas, Area { x, y: first, width: BAR_WIDTH, height: tall });
         }
         (y, maps)
     }
@@ -727,18 +714,18 @@ fn draw_clear_star(canvas: &mut Canvas, area: Area, (x, y): (f64, f64)) {
 }
 
 impl Colours {
-    fn width(&self, as_powers: bool) -> f64 {
-        let ticks = self.scale.ticks(6, as_powers);
+    fn width(&self) -> f64 {
+        let ticks = self.scale.ticks(6);
         BAR_SPACE + BAR_WIDTH + TICK_LENGTH + 2.0 + widest(&ticks) + 4.0 + SIZE + 1.0
     }
 
-    fn draw(&self, canvas: &mut Canvas, area: Area, as_powers: bool) {
+    fn draw(&self, canvas: &mut Canvas, area: Area) {
         let colour = |i| Some(viridis(1.0 - (i as f64 + 0.5) / BAR_STEPS as f64));
         if let Some(png) = super::export::image(1, &(0..BAR_STEPS).map(colour).collect::<Vec<_>>()) {
             canvas.image(area, &png);
         }
         canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
-        let ticks = self.scale.ticks(6, as_powers);
+        let ticks = self.scale.ticks(6);
         ticks.draw_side_axis(canvas, area, true, true);
         let mut words = self.label.clone();
         if ticks.power != 0 {

@@ -99,14 +99,9 @@ impl Scale {
         }
     }
 
-    /// About `count` labelled ticks; logarithmic ticks are powers of ten if `as_powers`, else decimals.
-    pub fn ticks(&self, count: usize, as_powers: bool) -> Ticks {
-        if self.log { self.powers(count, as_powers) } else { self.steps(count) }
-    }
-
-    /// Whether ticks are too small or too large for decimals.
-    pub fn needs_powers(&self) -> bool {
-        self.log && (self.low < 0.999e-3 || self.high > 1.001e4)
+    /// About `count` labelled ticks; logarithmic ticks are all decimals from 0.001 to 9999, else all powers of ten.
+    pub fn ticks(&self, count: usize) -> Ticks {
+        if self.log { self.powers(count) } else { self.steps(count) }
     }
 
     fn steps(&self, count: usize) -> Ticks {
@@ -133,7 +128,9 @@ impl Scale {
         Ticks { ticks: ticks.collect(), power }
     }
 
-    fn powers(&self, count: usize, as_powers: bool) -> Ticks {
+    fn powers(&self, count: usize) -> Ticks {
+        // Decimals from 0.001 to 9999, with room for rounding.
+        let as_powers = self.low < 0.999e-3 || self.high > 9999.0;
         let (first, last) = (self.low.log10() - 1e-6, self.high.log10() + 1e-6);
         let (lowest, highest) = (first.floor() as i32, last.ceil() as i32);
         let decades = (first.ceil() as i32..=last.floor() as i32).count();
@@ -225,7 +222,7 @@ mod tests {
     use super::*;
 
     fn labels(scale: Scale, count: usize) -> Vec<String> {
-        scale.ticks(count, scale.needs_powers()).ticks.into_iter().filter_map(|tick| tick.label).collect()
+        scale.ticks(count).ticks.into_iter().filter_map(|tick| tick.label).collect()
     }
 
     #[test]
@@ -233,7 +230,7 @@ mod tests {
         let scale = |low, high| Scale { low, high, log: false };
         assert_eq!(labels(scale(-0.5, 0.5), 5), ["−0.4", "−0.2", "0.0", "0.2", "0.4"]);
         assert_eq!(labels(scale(0.0, 100.0), 5), ["0", "20", "40", "60", "80", "100"]);
-        let small = scale(0.0, 3.1e-6).ticks(4, false);
+        let small = scale(0.0, 3.1e-6).ticks(4);
         assert_eq!(small.power, -6);
         assert_eq!(
             small.ticks.iter().filter_map(|tick| tick.label.as_deref()).collect::<Vec<_>>(),
@@ -249,6 +246,8 @@ mod tests {
         assert_eq!(labels(scale(3.0, 7.0), 4), ["3", "4", "5", "6", "7"]);
         // One format for each scale: no 0.01 together with powers of ten.
         assert_eq!(labels(scale(1e-3, 1e3), 7), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);
+        assert_eq!(labels(scale(15.0, 200.0), 4), ["20", "30", "50", "100", "200"]);
+        assert_eq!(labels(scale(100.0, 1e4), 4), ["10^{2}", "10^{3}", "10^{4}"]);
         assert_eq!(labels(scale(1e-4, 1.0), 5), ["10^{−4}", "10^{−3}", "10^{−2}", "10^{−1}", "10^{0}"]);
     }
 

@@ -111,7 +111,8 @@ fn every_table_has_its_picture() {
     for (table, svg) in tables.iter().zip(&all) {
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{table}");
     }
-    let words: Vec<String> = all.iter().map(|svg| words(svg)).collect();
+    let words_of = words;
+    let words: Vec<String> = all.iter().map(|svg| words_of(svg)).collect();
     assert!(words.iter().all(|words| !words.contains("NaN")));
     for part in
         ["Work gap of the cubic shortcuts", "infeasible", "vmin = 1", "best shortcut", "α2 tf", "α3 tf2", "tf = 0.02"]
@@ -121,6 +122,11 @@ fn every_table_has_its_picture() {
     assert!(words[2].contains("W* (μ0 σ l)"), "{}", words[2]);
     assert!(words[4].contains("vi = 3 v0, tf = 0.02 l/v0"), "{}", words[4]);
     assert!(words[4].contains("\nbounded friction, τceiling = 1.1 μ0 σ"), "{}", words[4]);
+    // A step costs little because it does not arrive.
+    let note = "The step only approaches the final state";
+    assert!(words[4].contains(note), "{}", words[4]);
+    shown(folder, &["plot", "results/small", "--table", "shortcut", "--where", "family!=step", "--out", "arrived.svg"]);
+    assert!(!words_of(&read(folder, "arrived.svg")).contains(note));
     // Scaled figures state their units too; nothing in a figure is for the command line.
     assert!(words[0].contains("a = 0.03 μ0, b = 0.05 μ0, vi = 3 v0"), "{}", words[0]);
     assert!(words.iter().all(|words| !words.contains("--")));
@@ -464,6 +470,18 @@ fn the_map_of_optima_shows_the_strategy_and_when_it_changes() {
     assert!(same.contains("W* (μ0 σ l)") && !same.contains("speed up"), "{same}");
 }
 
+/// Small gaps of the colour bar need powers of ten, durations and velocities do not.
+#[test]
+fn regress_each_axis_has_its_own_form_of_numbers() {
+    let spec = "[axes]\nt_f = { geomspace = [0.002, 0.1, 13] }\na = 0.03\nb = 0.05\nv_i = 3.0\n\
+                v_f = { geomspace = [3.3, 200.0, 13] }\n[tables.best_cubic]\n";
+    let (map, _) = picture("forms", spec, "best_cubic");
+    for part in ["\n0.003\n", "\n0.03\n", "\n30\n", "\n10−6\n"] {
+        assert!(map.contains(part), "{part} in {map}");
+    }
+    assert!(!map.contains('×'), "{map}");
+}
+
 #[test]
 fn gaps_below_zero_have_a_colour_of_their_own() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -480,6 +498,17 @@ fn gaps_below_zero_have_a_colour_of_their_own() {
         let words = words(&read(folder, "map.svg"));
         assert_eq!(words.contains("\ngap below 0\n"), is_below, "{words}");
     }
+}
+
+/// The best shortcut lies on the grid: its gap is rounding, and the next gap is seven decades above. The colour bar starts there.
+#[test]
+fn regress_gaps_that_are_rounding_do_not_stretch_the_colours() {
+    let spec = "[axes]\nt_f = 0.002\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 4.0\n\
+                alpha_2 = { linspace = [-0.1251150175, -0.0451150175, 21], unit = \"1/t_f\" }\n\
+                alpha_3 = { linspace = [-0.03821242107, 0.04178757893, 21], unit = \"1/t_f^2\" }\n[tables.gap]\n";
+    let (map, _) = picture("rounding", spec, "gap");
+    assert!(map.contains("\n10−5\n") && !map.contains("10−8"), "{map}");
+    assert!(map.contains("Gaps below rtol = 10−10, which are rounding, have the darkest colour."), "{map}");
 }
 
 #[test]
@@ -522,6 +551,15 @@ fn single_materials_are_symbols_of_their_outcome() {
     assert!(!svg.contains("<image") && !words.contains("no row"), "{words}");
 }
 
+/// Maps of stiffness over mass show the critical stiffness, as those over the final velocity do.
+#[test]
+fn regress_maps_over_mass_show_the_critical_stiffness() {
+    let spec = "[axes]\na = 0.005\nb = 0.01\nv_i = 1e5\nv_f = 1e6\nk = { geomspace = [1e-3, 1e-1, 5] }\n\
+                m = { geomspace = [1e-17, 1e-14, 5] }\n[tables.step_response]\n";
+    let (map, svg) = picture("mass", spec, "step_response");
+    assert!(svg.contains("<image") && map.contains("\nkc(vf)\n"), "{map}");
+}
+
 /// Lines over an axis are named by the labels of their points, also on request.
 #[test]
 fn regress_a_label_as_colour_names_lines() {
@@ -538,4 +576,26 @@ fn regress_a_label_as_colour_names_lines() {
     shown(folder, &[&lines[..], &["--color", "material"]].concat());
     let words = words(&plain);
     assert!(read(folder, "lines.svg") == plain && words.contains("granite") && words.contains("quartz"), "{words}");
+}
+
+/// A second axis that distinguishes lines is stated after the label; a label that all lines share is in the subtitle.
+#[test]
+fn regress_labels_stay_in_the_legend_when_another_axis_varies() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let folder = folder.path();
+    fs::write(folder.join("points.csv"), "material,a,b\nquartz,0.02,0.03\ngranite,0.01,0.015\n").expect("is writable");
+    let spec = "name = \"labels\"\npoints = \"points.csv\"\n[axes]\nt_f = [0.02, 0.05, 0.1]\nv_i = 3.0\n\
+                v_f = [50.0, 100.0]\n[tables.optimal]\n";
+    fs::write(folder.join("labels.toml"), spec).expect("is writable");
+    shown(folder, &["run", "labels.toml", "--quiet"]);
+    let lines = ["plot", "results/labels", "--x", "t_f", "--y", "work", "--table", "optimal", "--out", "lines.svg"];
+    shown(folder, &lines);
+    let both = words(&read(folder, "lines.svg"));
+    for part in ["quartz, vf = 50 v0", "quartz, vf = 100 v0", "granite, vf = 50 v0", "granite, vf = 100 v0"] {
+        assert!(both.contains(&format!("\n{part}\n")), "{part} in {both}");
+    }
+    assert!(!both.contains("a = "), "{both}");
+    shown(folder, &[&lines[..], &["--where", "material=granite"]].concat());
+    let one = words(&read(folder, "lines.svg"));
+    assert!(one.contains(", granite\n") && one.contains("\nvf = 50 v0\n"), "{one}");
 }

@@ -15,6 +15,7 @@ use crate::grid::Quantity;
 use crate::names;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
+use crate::sweep::Spec;
 use crate::table::{self, Kind, STATUS};
 
 /// Greatest number of kept values of an axis; of more, only the range is kept. Chosen: 25 times the cells of the finest picture, and a few
@@ -26,6 +27,9 @@ const MAX_LABELS: usize = 1000;
 
 /// Greatest number of values that a message lists; of more, it states the least and the greatest. Chosen: two lines of a terminal.
 const MAX_LISTED_VALUES: usize = 12;
+
+/// Tables whose gap is the difference of two works.
+const DIFFERENCES: [&str; 3] = ["gap", "shortcut", "compliant"];
 
 /// The values of an axis in the selected rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,6 +108,8 @@ pub struct FilteredTable {
     pub labels: Vec<(String, Vec<String>)>,
     /// The axes of the grid.
     pub gridded: Gridded,
+    /// The gap below which rounding dominates: `rtol` where it is the difference of two works; 0 where it is computed without cancellation.
+    pub least_gap: f64,
     parts: Vec<PathBuf>,
     conditions: Vec<Condition>,
 }
@@ -135,6 +141,7 @@ impl FilteredTable {
             missing,
             labels: Vec::new(),
             gridded: Gridded::of(&manifest.spec),
+            least_gap: if DIFFERENCES.contains(&name) { rtol(&manifest.spec, name) } else { 0.0 },
             parts,
             conditions: conditions.to_vec(),
         };
@@ -425,6 +432,12 @@ impl FilteredTable {
         let found = columns.iter().map(Values::listed).collect::<Vec<_>>().join("; ");
         Ok(PlotError::NoRows { table: self.table, text, found, help })
     }
+}
+
+/// The accuracy of a table of a spec; the default for a damaged spec.
+fn rtol(spec: &str, table: &str) -> f64 {
+    let spec = Spec::parse(spec).unwrap_or_default();
+    spec.tables.get(table).and_then(|table| table.rtol).unwrap_or(spec.accuracy.rtol)
 }
 
 /// The bits of numbers as a key, with one zero.

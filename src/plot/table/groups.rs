@@ -1,7 +1,7 @@
 //! The groups of a table: combinations of the axes that are not drawn in a panel. Each group makes a panel or a line.
 
 use std::cmp::Ordering;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use super::filtered::{FilteredTable, Values, bits};
 use indexmap::IndexMap;
@@ -161,10 +161,7 @@ impl Groups {
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
         let shown: Vec<Vec<f64>> =
             choice(&found, most, makes, series).into_iter().map(|place| found[place].clone()).collect();
-        let in_words = |of: &[usize], values: &[f64]| {
-            let named = of.iter().map(|&axis| (axes[axis], values[axis])).filter(|(_, value)| !value.is_nan());
-            named.filter_map(|(name, value)| Some(filtered.axis(name)?.text_of(value))).collect::<Vec<_>>()
-        };
+        let in_words = |of: &[usize], values: &[f64]| in_words(filtered, axes, of, values);
         let (named, different) = (varying(&shown), varying(&found));
         let same: Vec<usize> = different.into_iter().filter(|axis| !named.contains(axis)).collect();
         let held = shown.first().map_or_else(Vec::new, |first| in_words(&same, first));
@@ -186,7 +183,8 @@ impl Groups {
         Groups { axes, shown, all, left_out, makes, crossed: None, held: Vec::new(), places }
     }
 
-    /// Names the groups by their labels, if each has a unique label, in the order of their first rows: that of the file of points.
+    /// Names the groups by their labels, if each has one, and by the axes that distinguish groups of one label. Groups are in the order of their
+    /// first rows: that of the file of points. A label that all groups share is stated once.
     fn label(&mut self, filtered: &FilteredTable) -> Result<(), PlotError> {
         if filtered.labels.is_empty() || self.shown.len() < 2 {
             return Ok(());
@@ -207,12 +205,26 @@ impl Groups {
             is_one
         })?;
         let different: HashSet<&String> = labels.iter().filter(|label| !label.is_empty()).collect();
-        if is_one && different.len() == self.shown.len() {
-            let group =
-                |&place: &usize| Group { name: labels[place].clone(), values: self.shown[place].values.clone() };
-            self.shown = order.iter().map(group).collect();
-            self.places = places_of(&self.shown);
+        if !is_one || order.len() < self.shown.len() {
+            return Ok(());
         }
+        if let [label] = different.into_iter().collect::<Vec<_>>()[..] {
+            self.held.insert(0, label.clone());
+            return Ok(());
+        }
+        let of_label = |label: &String| -> Vec<Vec<f64>> {
+            let places = (0..labels.len()).filter(|&place| labels[place] == *label);
+            places.map(|place| self.shown[place].values.clone()).collect()
+        };
+        let within: BTreeSet<usize> = labels.iter().flat_map(|label| varying(&of_label(label))).collect();
+        let within: Vec<usize> = within.into_iter().collect();
+        let group = |&place: &usize| {
+            let values = self.shown[place].values.clone();
+            let words = [labels[place].clone()].into_iter().chain(in_words(filtered, &self.axes, &within, &values));
+            Group { name: words.collect::<Vec<_>>().join(", "), values }
+        };
+        self.shown = order.iter().map(group).collect();
+        self.places = places_of(&self.shown);
         Ok(())
     }
 
@@ -349,6 +361,12 @@ fn keys(filtered: &FilteredTable, axes: &[&str], makes: GroupRole) -> Result<Vec
     let in_order = |(a, b): (&f64, &f64)| a.total_cmp(b);
     found.sort_by(|a, b| a.iter().zip(b).map(in_order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal));
     Ok(found)
+}
+
+/// The values of the axes numbered `of` in markup, without missing ones.
+fn in_words(filtered: &FilteredTable, axes: &[impl AsRef<str>], of: &[usize], values: &[f64]) -> Vec<String> {
+    let named = of.iter().filter(|&&axis| !values[axis].is_nan());
+    named.filter_map(|&axis| Some(filtered.axis(axes[axis].as_ref())?.text_of(values[axis]))).collect()
 }
 
 /// The axes that vary between groups.

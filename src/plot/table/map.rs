@@ -111,11 +111,17 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
         });
     }
     figure.legend = shading.legend(&sheets, raster.are_dots);
+    let is_rounding = |value: &f64| *value < filtered.least_gap && !shading.is_below(*value);
+    let has_rounding = shading.is_logarithmic_gap() && sheets.iter().any(|sheet| sheet.value.iter().any(is_rounding));
+    let rounding = has_rounding.then(|| {
+        let least = label::number(filtered.least_gap);
+        format!("Gaps below rtol = {least}, which are rounding, have the darkest colour.")
+    });
     figure.colours = shading.colours;
     let unbounded = |name: &&String| filtered.axis(name).is_some_and(|axis| axis.infinite);
     let unbounded = [&plan.x, &plan.y].into_iter().find(unbounded);
     let unbounded = unbounded.map(|name| format!("Rows with {} = ∞ have no place in the map.", label::name(name)));
-    figure.notes.extend(along.into_iter().chain(no_value).chain(unbounded).chain(raster.note(plan)));
+    figure.notes.extend(along.into_iter().chain(no_value).chain(unbounded).chain(raster.note(plan)).chain(rounding));
     let least = sheets.iter().map(|sheet| sheet.least.map(|(x, y, _)| (x, y))).collect();
     Ok(MapFigure { figure, groups, least, cells: raster.cells })
 }
@@ -220,8 +226,8 @@ impl Shading<'_> {
         }
         let values = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
         let all = Scale::of(values()).ok_or(PlotError::Nothing)?;
-        // A gap has a logarithmic scale; one below 0 has a colour of its own.
-        let scale = match Scale::of(values().filter(|value| *value > 0.0)) {
+        // A gap has a logarithmic scale, without rounding; one below 0 has a colour of its own.
+        let scale = match Scale::of(values().filter(|value| *value > filtered.least_gap)) {
             Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
             _ if all.high > all.low => all,
             _ => all.with_room(0.05),
@@ -243,10 +249,14 @@ impl Shading<'_> {
         if self.is_stability() { 1 - (word as usize).min(1) } else { word as usize }
     }
 
+    /// Whether the colours are those of gaps on a logarithmic scale.
+    fn is_logarithmic_gap(&self) -> bool {
+        self.column == "gap" && self.colours.as_ref().is_some_and(|colours| colours.scale.log)
+    }
+
     /// Whether a value is a gap below 0, beyond the accuracy of both works: of a shortcut above the velocity ceiling, or a step that has not arrived.
     fn is_below(&self, value: f64) -> bool {
-        let is_logarithmic = self.colours.as_ref().is_some_and(|colours| colours.scale.log);
-        self.column == "gap" && is_logarithmic && value < -MAX_ROUNDED_GAP
+        self.is_logarithmic_gap() && value < -MAX_ROUNDED_GAP
     }
 
     /// The colour of a value; `None` for NaN.

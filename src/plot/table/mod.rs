@@ -309,19 +309,24 @@ fn fixed(filtered: &FilteredTable, drawn: &[String]) -> String {
 impl TableScene<'_> {
     /// Lines or a map, with the layers of the table.
     fn draw(&self, shape: &Shape) -> Result<Figure, PlotError> {
-        let mut figure = match shape {
+        let (mut figure, groups) = match shape {
             Shape::Map(plan) => {
                 let mut map = map::map(self.filtered, plan)?;
                 overlay::curves(self, plan, &mut map);
                 gap::border(self, plan, &mut map)?;
-                map.figure
+                (map.figure, map.groups)
             }
             Shape::Lines(plan) => {
                 let mut lines = lines::lines(self.filtered, plan)?;
                 overlay::marks(self, plan, &mut lines);
-                lines.figure
+                (lines.figure, lines.groups)
             }
         };
+        if (0..groups.shown.len()).any(|group| self.word(&groups, group, "family") == Some("step")) {
+            let note =
+                "The step only approaches the final state: its work may be below that of all protocols that reach it.";
+            figure.notes.push(note.to_owned());
+        }
         // The work of this table is the least work.
         if self.filtered.table == "optimal" {
             let least = "work_optimal";

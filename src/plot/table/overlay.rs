@@ -49,7 +49,7 @@ const OVERLAYS: [Overlay; 5] = [
     Overlay {
         tables: &["stability", "step_response"],
         value: "",
-        along: &["v_f"],
+        along: &["v_f", "m", "b", "a"],
         other: "k",
         curves: &[Curve("k_c_f", "", 1.0, &[4.0, 2.0])],
         steps: 400,
