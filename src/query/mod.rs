@@ -82,6 +82,15 @@ pub enum QueryError {
 /// Greatest length of an error of polars in a message, in characters. Chosen: two lines.
 const MAX_ERROR_CHARS: usize = 200;
 
+/// Functions of the engine, and their names elsewhere.
+const FUNCTIONS: [(&str, &[&str]); 5] = [
+    ("avg(x)", &["mean", "average"]),
+    ("stddev(x)", &["std", "stdev", "sd"]),
+    ("variance(x)", &["var"]),
+    ("quantile_cont(x, 0.9)", &["quantile", "percentile", "percentile_cont", "approx_quantile"]),
+    ("ORDER BY x LIMIT 1 for the row of the least x", &["argmin", "arg_min", "min_by", "argmax", "arg_max", "max_by"]),
+];
+
 impl QueryError {
     fn sql(found: impl Into<String>, help: impl Into<String>) -> QueryError {
         QueryError::Sql { found: found.into(), help: help.into() }
@@ -214,7 +223,12 @@ impl Tables {
             ("two keys of GROUP BY are functions of one column".to_owned(), help.to_owned())
         } else if known("LIMIT/OFFSET") {
             ("LIMIT and OFFSET take whole numbers from 0".to_owned(), "correct the number".to_owned())
-        } else if known("dtype") || known("cannot compare") || known("cannot cast") {
+        } else if let Some(name) = line.strip_prefix("unsupported function '") {
+            let name = name.split('\'').next().unwrap_or_default();
+            let ours = FUNCTIONS.iter().find(|(_, theirs)| theirs.contains(&name)).map(|(ours, _)| *ours);
+            let help = ours.map_or("choose another function".to_owned(), |ours| format!("write {ours}"));
+            (format!("no function `{name}`"), help)
+        } else if known("dtype") || known("supertype") || known("cannot compare") || known("cannot cast") {
             let help = "words can be compared and counted; arithmetic, sum and avg need numbers; CAST('inf' AS DOUBLE) is infinity";
             ("words in place of numbers, or numbers in place of words".to_owned(), help.to_owned())
         } else {

@@ -236,7 +236,8 @@ fn wrong_questions_are_answered_with_the_known_names() {
             "not SQL: Expected: an SQL statement, found: SELEC at Line: 1, Column: 1",
             correct,
         ),
-        ("SELECT frobnicate(gap) FROM best_cubic", "unsupported function 'frobnicate'", "correct the query"),
+        ("SELECT frobnicate(gap) FROM best_cubic", "no function `frobnicate`", "choose another function"),
+        ("SELECT mean(gap) FROM best_cubic", "no function `mean`", "write avg(x)"),
         ("", "the query is empty", "write one SELECT"),
         ("SELECT 1; SELECT 2", "several statements", "write one SELECT"),
         (
@@ -281,6 +282,7 @@ fn wrong_questions_are_answered_with_the_known_names() {
         "SELECT gap FROM best_cubic WHERE status = 1",
         "SELECT sqrt(status) FROM best_cubic",
         "SELECT avg(status) FROM best_cubic",
+        "SELECT t_f + strategy FROM optimal",
     ] {
         let found = "words in place of numbers, or numbers in place of words";
         let expected = (1, format!("error: {found}\n  help: {types}\n"));
