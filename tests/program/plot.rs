@@ -578,7 +578,7 @@ fn regress_a_label_as_colour_names_lines() {
     assert!(read(folder, "lines.svg") == plain && words.contains("granite") && words.contains("quartz"), "{words}");
 }
 
-/// A second axis that distinguishes lines is stated after the label; a label that all lines share is in the subtitle.
+/// A second axis that distinguishes lines is stated after the label; a label common to all lines is in the subtitle.
 #[test]
 fn regress_labels_stay_in_the_legend_when_another_axis_varies() {
     let folder = tempfile::tempdir().expect("is writable");

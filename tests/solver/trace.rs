@@ -6,6 +6,7 @@ use crate::support::{Random, relative};
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 use slipsweep::model::{Friction, Law, StateLaw, Transition};
+use slipsweep::numerics::double_double::DoubleDouble;
 use slipsweep::protocol::optimal::Bounds;
 use slipsweep::protocol::shortcut::{self, Case};
 use slipsweep::protocol::{Moment, Motion, SolverStats, Status, optimal};
@@ -62,7 +63,7 @@ fn shortcuts() -> Vec<(Protocol, Case)> {
     }
     cases.extend([0.02, 0.037, 0.049].map(|t_f| (BEST_CUBIC, case(PAPER, t_f))));
     for friction in Friction::ALL {
-        let point = Protocol::CubicPoint { law: StateLaw::Ageing, friction, a_2: 0.01, a_3: -0.5 };
+        let point = Protocol::CubicPoint { law: StateLaw::Ageing, friction, place: place(0.01, -0.5) };
         cases.push((point, case(PAPER, 0.02)));
     }
     cases
@@ -103,6 +104,10 @@ fn integral(motion: &dyn Motion, from: f64, to: f64, f: impl Fn(&Moment) -> f64)
         row = row.windows(2).map(|pair| pair[1] + (pair[1] - pair[0]) / (power - 1.0)).collect();
     }
     row[0]
+}
+
+fn place(a_2: f64, a_3: f64) -> [DoubleDouble; 2] {
+    [a_2, a_3].map(DoubleDouble::new)
 }
 
 #[test]
@@ -555,7 +560,7 @@ fn what_does_not_exist_states_which_bound() {
     let free = absent(optimal(false), BACK, 0.3);
     assert_eq!(free.to_string(), "t_f = 0.3 is too short for v > 0: the least is t_min = 0.3233333333333333");
     assert_eq!(absent(BEST_CUBIC, BACK, 0.3955), Absence::Cubic { bounded: true });
-    let steep = Protocol::CubicPoint { law: StateLaw::Ageing, friction: Friction::Log, a_2: 3.0, a_3: 0.0 };
+    let steep = Protocol::CubicPoint { law: StateLaw::Ageing, friction: Friction::Log, place: place(3.0, 0.0) };
     assert_eq!(absent(steep, PAPER, 0.02).to_string(), "v or theta would not stay positive");
     // Without the bound the optimum may leave the model, as its status reports.
     let below = path(optimal(false), case(PAPER, 0.06));

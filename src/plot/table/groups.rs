@@ -184,7 +184,7 @@ impl Groups {
     }
 
     /// Names the groups by their labels, if each has one, and by the axes that distinguish groups of one label. Groups are in the order of their
-    /// first rows: that of the file of points. A label that all groups share is stated once.
+    /// first rows: that of the file of points. A label common to all groups is stated once.
     fn label(&mut self, filtered: &FilteredTable) -> Result<(), PlotError> {
         if filtered.labels.is_empty() || self.shown.len() < 2 {
             return Ok(());

@@ -28,7 +28,7 @@ impl CubicPoint {
 }
 
 /// The fraction of the tolerance of a velocity that the rounding of the coefficients may use. Chosen: a half.
-const ROUNDING_SHARE: f64 = 0.5;
+const ROUNDING_FRACTION: f64 = 0.5;
 
 impl Landscape {
     /// Whether a relative error of `f64::EPSILON` of both coefficients matters to a shortcut of this `status` and `v_min`: it changes theta by up to
@@ -42,7 +42,7 @@ impl Landscape {
         if status == Status::Infeasible {
             return path.n.bounds().1 > -of_n && path.n.least() > -of_n && path.theta.least() > -of_theta;
         }
-        let tolerance = ROUNDING_SHARE * self.ends.v_loss;
+        let tolerance = ROUNDING_FRACTION * self.ends.v_loss;
         let matters = |theta: f64, n: f64| {
             let (theta, n) = (theta - of_theta, n - of_n);
             theta <= 0.0 || n <= 0.0 || change * (n + 3.0 * theta) > tolerance * theta * n
