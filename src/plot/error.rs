@@ -65,6 +65,11 @@ pub enum PlotError {
         "--where {text}: the column `{column}` has numbers\n  expected: a number without a unit, such as 0.03, 1e-6 or inf\n  help: correct the value"
     )]
     NotNumber { text: String, column: String },
+    /// A word that a column never has.
+    #[error(
+        "--where {text}: `{column}` is never `{word}`\n  expected: {}\n  help: {}", .words.join(", "), crate::names::hint(.word, .words.iter().copied())
+    )]
+    NotWord { text: String, column: String, word: String, words: &'static [&'static str] },
     /// No row meets the conditions.
     #[error("--where {text}: no row of the table `{table}` meets this\n  found: {found}\n  help: {help}")]
     NoRows { table: String, text: String, found: String, help: String },

@@ -174,6 +174,11 @@ fn refusals(folder: &Path) {
          gap, v_min, status\n  help: did you mean `t_f`?\n"
     );
     assert_eq!(
+        complaint(folder, &["plot", "results/small", "--table", "optimal", "--where", "strategy!=speedup"]),
+        "error: --where strategy != speedup: `strategy` is never `speedup`\n  expected: speed_up, slow_down, floor, wait_jerk, \
+         jerk_wait, chatter, rise\n  help: did you mean `speed_up`?\n"
+    );
+    assert_eq!(
         with(&["--x", "gap"]),
         "error: --x: the table `gap` has no axis `gap`\n  found: t_f, a, b, v_i, v_f, alpha_2, alpha_3\n  help: choose one of these\n"
     );

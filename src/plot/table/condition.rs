@@ -34,7 +34,8 @@ pub struct Condition {
     /// The column.
     pub column: String,
     relation: Relation,
-    value: String,
+    /// The number or word.
+    pub value: String,
 }
 
 impl Condition {

@@ -151,6 +151,14 @@ impl FilteredTable {
             if is_number && !condition.is_of_number() {
                 return Err(PlotError::NotNumber { text: condition.shown(), column: condition.column.clone() });
             }
+            let columns = table::find(name).map_or(&[][..], |table| table.columns());
+            let kind = columns.iter().find(|column| column.name == condition.column).map(|column| column.kind);
+            if let Some(Kind::Label(words)) = kind
+                && !words.contains(&condition.value.as_str())
+            {
+                let (text, column) = (condition.shown(), condition.column.clone());
+                return Err(PlotError::NotWord { text, column, word: condition.value.clone(), words });
+            }
         }
         let known = table::find(name).map_or(&[][..], |table| table.axes());
         let names = filtered.headings.iter().map(|heading| heading.name.as_str());
