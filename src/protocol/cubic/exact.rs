@@ -27,9 +27,6 @@ impl CubicPoint {
         CubicPoint { status: Status::Infeasible, work: f64::NAN, v_min: f64::NAN, v_max: f64::NAN };
 }
 
-/// The fraction of the tolerance of a velocity that the rounding of the coefficients may use. Chosen: a half.
-const ROUNDING_FRACTION: f64 = 0.5;
-
 impl Landscape {
     /// Whether a relative error of `f64::EPSILON` of both coefficients matters to a shortcut of this `status` and `v_min`: it changes theta by up to
     /// `EPSILON (|a_2| + |a_3|)` and `n` by up to three times as much. The bound `v = 1` is decided with all digits.
@@ -42,7 +39,8 @@ impl Landscape {
         if status == Status::Infeasible {
             return path.n.bounds().1 > -of_n && path.n.least() > -of_n && path.theta.least() > -of_theta;
         }
-        let tolerance = ROUNDING_FRACTION * self.ends.v_loss;
+        // Half of rtol.
+        let tolerance = self.ends.v_loss;
         let matters = |theta: f64, n: f64| {
             let (theta, n) = (theta - of_theta, n - of_n);
             theta <= 0.0 || n <= 0.0 || change * (n + 3.0 * theta) > tolerance * theta * n
