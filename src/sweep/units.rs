@@ -106,7 +106,8 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
     let scaled = units.scaled("v_0", value);
     match units {
         _ if !is_velocity || value <= 0.0 || !value.is_finite() => "choose values in the range",
-        Units::Scaled if scaled >= 1.0 => "choose values in the range",
+        Units::Scaled if scaled == 1.0 => "1 is v_0, the velocity floor; choose a velocity above it, such as 1.001",
+        Units::Scaled if scaled > 1.0 => "choose values in the range",
         Units::Si(_) if scaled > 1.0 => PROBABLY_SCALED,
         Units::Scaled => "velocities are in units of v_0; for m/s, add `units = \"si\"` and the scales to [model]",
         Units::Si(_) => "with `units = \"si\"`, velocities are in m/s; choose one above v_0, or lower v_0",
