@@ -3,9 +3,9 @@
 use super::MAX_PANELS;
 use super::gauss::rule;
 
-/// Relative difference of the rules with 10 and 20 nodes at which the second has rounding errors only: for an analytic function, its error is of the
-/// order of the square of that of the first.
-const COARSE_RTOL: f64 = 1e-8;
+/// Relative difference of the rules with 10 and 20 nodes at which the second is good to rounding. Derived: for an analytic function its error is of the
+/// order of the square of that of the first; near a kink, only some times less, so that the difference must be small itself.
+const COARSE_RTOL: f64 = 1e-13;
 
 /// Difference of both rules that is none. Derived: far above the least double, so that rounding near it does not matter.
 const UNDERFLOW: f64 = 1e-280;

@@ -319,7 +319,9 @@ fn evaluate(
         }
         landscape.greatest_velocities(&a_2, &a_3, now.status, v_max);
         for i in (0..length).filter(|_| is_rounded) {
-            if !landscape.depends_on_rounding([a_2[i], a_3[i]], now.status[i], v_min[i]) {
+            // Error bounds do not count the rounding.
+            let is_bounded = prepared.finest.is_some() && now.status[i] != Status::Infeasible;
+            if !is_bounded && !landscape.depends_on_rounding([a_2[i], a_3[i]], now.status[i], v_min[i]) {
                 continue;
             }
             let place = coefficients.exact(first + i, t_f);
