@@ -137,7 +137,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     }
     if audits.iter().all(|audit| audit.rows == 0 && !audit.unchecked.is_empty()) {
         return Err(VerifyError(
-            "no part of the sample is there\n  help: compute the parts with `slipsweep run`".to_owned(),
+            "no row of the sample is in a part that is there\n  help: raise --sample, or compute the parts with `slipsweep run`".to_owned(),
         ));
     }
     Ok(audits)

@@ -254,7 +254,7 @@ fn a_folder_without_a_dataset_is_refused() {
     let output = verify(folder.path(), &[]);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{message}");
-    assert!(message.contains("no part of the sample is there") && message.contains("`slipsweep run`"), "{message}");
+    assert!(message.contains("no row of the sample is in a part") && message.contains("`slipsweep run`"), "{message}");
 }
 
 /// Steps that settle, and that end on limit cycles, with the shortcut and the optimum on the same springs.
