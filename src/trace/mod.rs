@@ -42,7 +42,7 @@ const JUMP_RTOL: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Times {
     /// The fewest times at which straight lines have errors below [`RANGE_RTOL`] of the range of every column, and below a relative
-    /// [`VALUE_RTOL`] of velocity and theta, except below `1e-12` of their greatest values.
+    /// [`VALUE_RTOL`] of velocity and theta.
     Fewest,
     /// A number of equally spaced times from 0 to `t_f`, at least 2.
     Spaced(usize),

@@ -53,17 +53,15 @@ pub struct Samples {
 struct Tolerance {
     /// Absolute tolerance of each column, from its range.
     range: [f64; COLUMNS],
-    /// Change of each column that counts as rounding.
-    noise: [f64; COLUMNS],
 }
 
 impl Tolerance {
-    /// The tolerance of a column at `value`.
+    /// The tolerance of a column at `value`. Velocity and theta have a relative accuracy at every size.
     fn at(&self, column: usize, value: f64) -> f64 {
         if column >= POSITIVE_COLUMNS {
             return self.range[column];
         }
-        self.range[column].min((SAMPLES_FRACTION * VALUE_RTOL * value.abs()).max(self.noise[column]))
+        self.range[column].min((SAMPLES_FRACTION * VALUE_RTOL * value.abs()).max(f64::MIN_POSITIVE))
     }
 }
 
@@ -250,9 +248,10 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
             }
         }
     }
-    let noise = ranges.map(|(least, greatest)| ROUNDING_RTOL * least.abs().max(greatest.abs()));
-    let range = std::array::from_fn(|i| (SAMPLES_FRACTION * RANGE_RTOL * (ranges[i].1 - ranges[i].0)).max(noise[i]));
-    Tolerance { range, noise }
+    let of_range = |(least, greatest): (f64, f64)| {
+        (SAMPLES_FRACTION * RANGE_RTOL * (greatest - least)).max(ROUNDING_RTOL * least.abs().max(greatest.abs()))
+    };
+    Tolerance { range: ranges.map(of_range) }
 }
 
 /// Whether no step takes most of the time of an interval, so that points between its ends can be compared.
