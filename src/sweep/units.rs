@@ -34,13 +34,17 @@ pub fn units(model: &ModelSpec) -> Result<Units, SpecError> {
             }
         },
         "si" => {
+            let missing = scales.iter().filter(|(_, value, _)| value.is_none()).map(|(name, ..)| *name);
+            let missing: Vec<&str> = missing.collect();
+            if !missing.is_empty() {
+                let expected = "mu_0, l in m, v_0 in m/s and normal_stress in Pa";
+                let found = format!("\"si\" without `{}`", missing.join("`, `"));
+                let help = format!("add `{} = ...` to [model]", missing.join(" = ...`, `"));
+                return refuse("model.units", found, expected, help);
+            }
             let mut values = [0.0; 4];
             for (place, (name, value, unit)) in scales.into_iter().enumerate() {
-                let Some(value) = value else {
-                    let expected = "mu_0, l in m, v_0 in m/s and normal_stress in Pa";
-                    let (found, help) = (format!("\"si\" without `{name}`"), format!("add `{name} = ...` to [model]"));
-                    return refuse("model.units", found, expected, help);
-                };
+                let value = value.unwrap_or_default();
                 if !(value > 0.0 && value.is_finite()) {
                     let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
                     let (key, expected) = (format!("model.{name}"), format!("{name} > 0, finite{unit}"));

@@ -123,6 +123,33 @@ struct PreparedLandscape {
     error_optimal: f64,
 }
 
+impl PreparedLandscape {
+    /// Whether the rounding of the coefficients matters to a shortcut of its landscape, of this status and least velocity. Error bounds do not count
+    /// this rounding.
+    fn depends_on_rounding(&self, landscape: &Landscape, place: [f64; 2], status: Status, v_min: f64) -> bool {
+        self.finest.is_some() && status != Status::Infeasible || landscape.depends_on_rounding(place, status, v_min)
+    }
+
+    /// The shortcut with exact coefficients, and the error bound of its work: NaN if it is not requested.
+    fn exact(
+        &self,
+        landscape: &Landscape,
+        job: &Job<'_>,
+        place: [DoubleDouble; 2],
+        work: &mut RunStats,
+    ) -> (CubicPoint, f64) {
+        let mut stats = SolverStats::default();
+        let mut point = |of: &Landscape, rtol| of.point(place, job.friction, rtol, &mut stats);
+        let found = point(landscape, job.rtol).unwrap_or(CubicPoint::INFEASIBLE);
+        let error = self.finest.as_ref().and_then(|(finest, transition, t_f)| {
+            let again = point(finest, error::TIGHTEST_RTOL)?;
+            Some(error::of_shortcut(transition, *t_f, found.v_min, found.work, again.work))
+        });
+        *work += RunStats::from(stats);
+        (found, error.unwrap_or(f64::NAN))
+    }
+}
+
 /// The groups of a part, and the row of each place in the order of computation, if the orders differ.
 fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<LandscapeRows>, Option<Vec<u32>>) {
     let mut runs = view.tuples(&job.tuples, rows.clone());
@@ -319,26 +346,17 @@ fn evaluate(
         }
         landscape.greatest_velocities(&a_2, &a_3, now.status, v_max);
         for i in (0..length).filter(|_| is_rounded) {
-            // Error bounds do not count the rounding.
-            let is_bounded = prepared.finest.is_some() && now.status[i] != Status::Infeasible;
-            if !is_bounded && !landscape.depends_on_rounding([a_2[i], a_3[i]], now.status[i], v_min[i]) {
+            let rounded = [a_2[i], a_3[i]];
+            if !prepared.depends_on_rounding(landscape, rounded, now.status[i], v_min[i]) {
                 continue;
             }
             let place = coefficients.exact(first + i, t_f);
-            let mut stats = SolverStats::default();
-            let mut point = |of: &Landscape, rtol| of.point(place, job.friction, rtol, &mut stats);
-            let exact = point(landscape, job.rtol).unwrap_or(CubicPoint::INFEASIBLE);
+            let (exact, error) = prepared.exact(landscape, job, place, &mut work);
             now.status[i] = exact.status;
-            let finest = prepared.finest.as_ref().and_then(|(finest, transition, t_f)| {
-                let again = point(finest, error::TIGHTEST_RTOL)?;
-                Some(error::of_shortcut(transition, *t_f, exact.v_min, exact.work, again.work))
-            });
-            let error = finest.unwrap_or(f64::NAN);
             let cells = [works.get_mut(i), v_min.get_mut(i), v_max.get_mut(i), errors.get_mut(i)];
             for (cell, value) in cells.into_iter().zip([exact.work, exact.v_min, exact.v_max, error]) {
                 cell.into_iter().for_each(|cell| *cell = value);
             }
-            work += RunStats::from(stats);
         }
 
         compare(prepared, now.status, [works, v_min, work_optimal, gap, gap_error], errors);

@@ -32,9 +32,6 @@ const DOT_ROOM: f64 = 0.04;
 /// Pixels along an axis with cells of unequal width. Chosen: more than its cells.
 const PIXELS: usize = 1024;
 
-/// Greatest magnitude of a gap below 0 that counts as rounding. Chosen: above the error of a gap at any usual `rtol`.
-const MAX_ROUNDED_GAP: f64 = 1e-6;
-
 /// The colour of gaps below 0: none of the colours of the scale.
 const BELOW_ZERO: [u8; 3] = [0xcc, 0x79, 0xa7];
 
@@ -84,6 +81,8 @@ struct Shading<'a> {
     column: &'a str,
     words: Vec<String>,
     colours: Option<Colours>,
+    /// The size below which a gap is rounding.
+    least_gap: f64,
 }
 
 /// Draws the map.
@@ -111,7 +110,7 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
         });
     }
     figure.legend = shading.legend(&sheets, raster.are_dots);
-    let is_rounding = |value: &f64| *value < filtered.least_gap && !shading.is_below(*value);
+    let is_rounding = |value: &f64| value.abs() < shading.least_gap;
     let has_rounding = shading.is_logarithmic_gap() && sheets.iter().any(|sheet| sheet.value.iter().any(is_rounding));
     let rounding = has_rounding.then(|| {
         let least = label::number(filtered.least_gap);
@@ -220,14 +219,14 @@ impl Raster {
 
 impl Shading<'_> {
     fn new<'a>(filtered: &FilteredTable, column: &'a str, sheets: &[PanelCells]) -> Result<Shading<'a>, PlotError> {
-        let words = filtered.words(column);
+        let (words, least_gap) = (filtered.words(column), filtered.least_gap);
         if !words.is_empty() {
-            return Ok(Shading { column, words, colours: None });
+            return Ok(Shading { column, words, colours: None, least_gap });
         }
         let values = || sheets.iter().flat_map(|sheet| sheet.value.iter().copied());
         let all = Scale::of(values()).ok_or(PlotError::Nothing)?;
         // A gap has a logarithmic scale, without rounding; one below 0 has a colour of its own.
-        let scale = match Scale::of(values().filter(|value| *value > filtered.least_gap)) {
+        let scale = match Scale::of(values().filter(|value| *value > least_gap)) {
             Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
             _ if all.high > all.low => all,
             _ => all.with_room(0.05),
@@ -236,6 +235,7 @@ impl Shading<'_> {
             column,
             words,
             colours: Some(Colours { label: label::axis(column, &filtered.unit(column), 0), scale }),
+            least_gap,
         })
     }
 
@@ -256,7 +256,7 @@ impl Shading<'_> {
 
     /// Whether a value is a gap below 0, beyond the accuracy of both works: of a shortcut above the velocity ceiling, or a step that has not arrived.
     fn is_below(&self, value: f64) -> bool {
-        self.is_logarithmic_gap() && value < -MAX_ROUNDED_GAP
+        self.is_logarithmic_gap() && value < -self.least_gap
     }
 
     /// The colour of a value; `None` for NaN.
