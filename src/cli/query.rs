@@ -6,6 +6,7 @@
 use std::env;
 use std::fs;
 use std::io::{self, BufWriter, Read, Write};
+use std::mem;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -20,7 +21,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use super::output::{self, Output};
 use super::{Failure, cannot_write, keep_datasets, kind, real, say, stdout, summary, to_file, words, written, wrong};
 use crate::dataset::atomic;
-use crate::query::{self, Answer, AnswerError, Tables};
+use crate::query::{self, Answer, AnswerError, Comparisons, Tables};
 
 /// Arguments of `query`.
 #[derive(Debug, clap::Args)]
@@ -240,32 +241,46 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
     super::note_at(&arguments.dataset);
     let tables = Tables::open(&arguments.dataset)?;
-    let answer = tables.query(&arguments.sql)?;
+    let mut answer = tables.query(&arguments.sql)?;
     for source in tables.sources.iter().filter(|source| source.missing > 0) {
         let (missing, all) = (source.missing, source.missing + source.paths.len() as u64);
-        // A note that cannot be printed is no failure.
-        let _ = writeln!(
-            io::stderr(),
-            "note: `{}` lacks {} of {}, which `slipsweep run` computes",
+        note(&format!(
+            "`{}` lacks {} of {}, which `slipsweep run` computes",
             source.name,
             words::count(missing),
             words::things(all, "part")
-        );
+        ));
     }
+    let Comparisons { words, numbers } = mem::take(&mut answer.comparisons);
+    words.iter().for_each(|text| note(text));
+    let note_empty = |rows| {
+        let is_unexplained = rows == 0 && words.is_empty();
+        numbers.iter().filter(|_| is_unexplained).for_each(|text| note(text));
+    };
     if arguments.output.is_stdout() {
         let mut out = stdout()?;
-        return match write(answer, format, &mut out).and_then(|()| Ok(out.flush()?)) {
+        return match write(answer, format, &mut out) {
             Err(AnswerError::Write(error)) => written(Err(error)),
-            done => done.map_err(|error| failure(&tables, arguments, error)),
+            done => done.map(note_empty).map_err(|error| failure(&tables, arguments, error)),
         };
     }
     let path = arguments.output.out.display();
-    let fill = |file: &mut dyn Write| write(answer, format, &mut BufWriter::new(file));
+    let mut rows = 0;
+    let fill = |file: &mut dyn Write| {
+        rows = write(answer, format, &mut BufWriter::new(file))?;
+        Ok(())
+    };
     to_file(&arguments.output.out, fill).map_err(|error| match error {
         AnswerError::Write(error) => cannot_write(&arguments.output.out, &error),
         error => failure(&tables, arguments, error),
     })?;
+    note_empty(rows);
     say(&format!("written to {path}\n"))
+}
+
+/// Prints a note. One that cannot be printed is no failure.
+fn note(text: &str) {
+    let _ = writeln!(io::stderr(), "note: {text}");
 }
 
 /// The failure of a query, or of files that cannot be read to the end.
@@ -290,7 +305,7 @@ pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     Failure::failed(format!("{path}: {error}\n  help: {help}"))
 }
 
-fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<(), AnswerError> {
+fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<usize, AnswerError> {
     let format = match format {
         Format::Table => return table(answer, out),
         Format::Csv => query::Format::Csv,
@@ -300,15 +315,16 @@ fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<(), Answ
     answer.write(format, out)
 }
 
-/// Writes aligned columns under their names and, if known, their units.
-fn table(answer: Answer, out: &mut dyn Write) -> Result<(), AnswerError> {
+/// Writes aligned columns under their names and, if known, their units, and returns the number of rows.
+fn table(answer: Answer, out: &mut dyn Write) -> Result<usize, AnswerError> {
     let mut columns = words::Columns::default();
     let mut lines = words::headed(answer.columns.clone(), answer.units.clone(), Vec::new());
-    answer.rows(|rows| {
+    let rows = answer.rows(|rows| {
         lines.extend(rows.iter().map(|row| row.iter().map(summary::shown).collect()));
         out.write_all(columns.lines(&lines, 0).as_bytes())?;
         lines.clear();
         Ok(())
     })?;
-    Ok(out.flush()?)
+    out.flush()?;
+    Ok(rows)
 }

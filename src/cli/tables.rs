@@ -38,7 +38,7 @@ fn text(table: &Table) -> String {
     let mut rows: Vec<Vec<String>> = Vec::new();
     for axis in Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis)) {
         let unit = if axis.words().is_empty() { axis.unit(Scale::Model) } else { "word" };
-        rows.push([axis.name(), unit, axis.doc()].map(str::to_owned).into());
+        rows.push(vec![axis.name().to_owned(), unit.to_owned(), with_words(table, axis.name(), axis.doc())]);
     }
     for column in table.columns() {
         let unit = match column.kind {
@@ -47,8 +47,21 @@ fn text(table: &Table) -> String {
             _ => column.unit(&no_axes),
         };
         let note = if column.optional { " (optional)" } else { "" };
-        rows.push(vec![column.name.to_owned(), unit.to_owned(), format!("{}{note}", column.doc)]);
+        rows.push(vec![
+            column.name.to_owned(),
+            unit.to_owned(),
+            format!("{}{note}", with_words(table, column.name, column.doc)),
+        ]);
     }
-    rows.push([STATUS, "word", STATUS_DOC].map(str::to_owned).into());
+    rows.push(vec![STATUS.to_owned(), "word".to_owned(), with_words(table, STATUS, STATUS_DOC)]);
     format!("{}: {}\n{}", table.name(), table.doc(), words::aligned(&rows, 2))
+}
+
+/// The meaning of a column, with the words that it can have unless the meaning has them.
+fn with_words(table: &Table, column: &str, doc: &str) -> String {
+    let words = table::vocabulary(table.name(), column);
+    if words.iter().all(|word| doc.contains(word)) {
+        return doc.to_owned();
+    }
+    format!("{doc}; one of {}", words.join(", "))
 }

@@ -824,7 +824,11 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     for (parameter, doc) in parameters(request, path) {
         text.push_str(&format!("  {}: {doc}\n", parameter.words()));
     }
-    text.push_str(&format!("  {}\n  status {}\n", all(&results(request, path, trace)), status(path.status)));
+    text.push_str(&format!(
+        "  {}\n  status {}\n",
+        all(&results(request, path, trace)),
+        status(path.status, &request.units)
+    ));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
         Some(_) => text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n")),
@@ -837,13 +841,15 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     text
 }
 
-fn status(status: Status) -> String {
+/// A status and its meaning.
+fn status(status: Status, units: &Units) -> String {
+    let floor = if *units == Units::Scaled { "1" } else { "v_0" };
     let meaning = match status {
-        Status::BelowBound => ": v < 1 somewhere, outside the range of the friction law",
-        Status::Infeasible => ": no protocol with v >= 1 arrives in this time",
-        Status::NegativeFriction => ": friction < 0 somewhere, outside any friction law",
-        Status::Unproven => ": friction is so low that the extremal need not be the only one",
-        _ => "",
+        Status::BelowBound => format!(": v < {floor} somewhere, outside the range of the friction law"),
+        Status::Infeasible => format!(": no protocol with v >= {floor} arrives in this time"),
+        Status::NegativeFriction => ": friction < 0 somewhere, outside any friction law".to_owned(),
+        Status::Unproven => ": friction is so low that the extremal need not be the only one".to_owned(),
+        _ => String::new(),
     };
     format!("{}{meaning}", status.name())
 }

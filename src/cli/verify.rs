@@ -35,6 +35,9 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let again = || audit(path, &manifest, arguments.sample, arguments.seed);
     let audits = waiting("solving the sample again", again).map_err(Failure::failed)?;
     say(&report(&audits))?;
+    if let Some(fault) = audits.iter().find_map(|audit| audit.fault.as_ref()) {
+        return Err(Failure::failed(fault));
+    }
     let errors: usize = audits.iter().map(|audit| audit.errors).sum();
     if errors > 0 {
         let message = format!(
@@ -81,7 +84,7 @@ pub fn report(audits: &[Audit]) -> String {
             text.push_str(&format!("{table}: {} not checked: {reason}\n", words::things(*rows, "row")));
         }
     }
-    if audits.iter().all(|audit| audit.errors == 0) {
+    if audits.iter().all(|audit| audit.errors == 0 && audit.fault.is_none()) {
         text.push_str(&format!("no number differs by more than {MAX_DIFFERENCE_RTOLS} rtol\n"));
     }
     text

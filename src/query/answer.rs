@@ -17,6 +17,7 @@ use polars_io::SerWriter;
 use polars_io::prelude::CsvWriter;
 use rayon::prelude::*;
 
+use super::comparisons::Comparisons;
 use super::plan;
 use super::scan::{Files, append};
 use super::streaming::{GroupPlan, Key, PARTS, StreamPlan};
@@ -34,6 +35,8 @@ pub struct Answer {
     pub columns: Vec<String>,
     /// The units of its columns; empty if unknown.
     pub units: Vec<String>,
+    /// Comparisons of its query that may be mistakes.
+    pub comparisons: Comparisons,
     pub(super) frame: LazyFrame,
     /// Its computation part by part, if possible.
     pub(super) streaming: Option<StreamPlan>,
@@ -79,12 +82,12 @@ impl From<ParquetError> for AnswerError {
 type BatchHandler<'a> = &'a mut dyn FnMut(&DataFrame) -> Result<(), AnswerError>;
 
 impl Answer {
-    /// Passes its rows to `take`, some thousands at a time.
+    /// Passes its rows to `take`, some thousands at a time, and returns their number.
     ///
     /// # Errors
     ///
     /// If the answer cannot be computed, or `take` fails.
-    pub fn rows(self, mut take: impl FnMut(Vec<Vec<Cell>>) -> io::Result<()>) -> Result<(), AnswerError> {
+    pub fn rows(self, mut take: impl FnMut(Vec<Vec<Cell>>) -> io::Result<()>) -> Result<usize, AnswerError> {
         self.for_each_batch(&mut |batch| {
             let columns: Vec<Vec<Cell>> = batch.columns().iter().map(cells).collect();
             let mut columns: Vec<_> = columns.into_iter().map(Vec::into_iter).collect();
@@ -93,14 +96,14 @@ impl Answer {
         })
     }
 
-    /// Writes the answer to `out`.
+    /// Writes the answer to `out`, and returns the number of its rows.
     ///
     /// # Errors
     ///
     /// If the answer cannot be computed or written.
-    pub fn write(self, format: Format, out: &mut dyn Write) -> Result<(), AnswerError> {
+    pub fn write(self, format: Format, out: &mut dyn Write) -> Result<usize, AnswerError> {
         let mut first = true;
-        match format {
+        let rows = match format {
             Format::Csv => self.for_each_batch(&mut |batch| {
                 let mut bytes = Vec::new();
                 let header = std::mem::take(&mut first);
@@ -113,7 +116,7 @@ impl Answer {
                 let units = self.units.clone();
                 let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
                 let mut writer: Option<(SchemaRef, ArrowWriter<Vec<u8>>)> = None;
-                self.for_each_batch(&mut |batch| {
+                let rows = self.for_each_batch(&mut |batch| {
                     if writer.is_none() {
                         without_lists(batch, "a Parquet answer")?;
                         let schema = arrow_schema(batch, &units);
@@ -129,14 +132,21 @@ impl Answer {
                 if let Some((_, writer)) = writer {
                     out.write_all(&writer.into_inner()?)?;
                 }
+                rows
             }
-        }
-        Ok(out.flush()?)
+        };
+        out.flush()?;
+        Ok(rows)
     }
 
-    /// Computes the answer on all threads and passes it on batch by batch: at least one batch, even without rows.
-    fn for_each_batch(self, take: BatchHandler) -> Result<(), AnswerError> {
+    /// Computes the answer on all threads and passes it on batch by batch: at least one batch, even without rows. Returns the number of rows.
+    fn for_each_batch(self, take: BatchHandler) -> Result<usize, AnswerError> {
         let Answer { frame, streaming, .. } = self;
+        let mut rows = 0;
+        let take: BatchHandler = &mut |batch| {
+            rows += batch.height();
+            take(batch)
+        };
         match streaming {
             Some(streaming) if streaming.groups.is_none() && streaming.keys.is_empty() => stream(&streaming, take),
             Some(streaming) => match guarded(|| combine(&streaming)) {
@@ -145,7 +155,8 @@ impl Answer {
                 _ => pass_on(&whole(frame)?, take),
             },
             None => pass_on(&whole(frame)?, take),
-        }
+        }?;
+        Ok(rows)
     }
 }
 

@@ -13,6 +13,7 @@ use sqlparser::ast::{
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 
+use super::comparisons::Comparisons;
 use super::scan::Files;
 use super::units::{Columns, units};
 use super::walk::walk;
@@ -29,6 +30,8 @@ pub struct CheckedQuery {
     pub read: HashSet<String>,
     /// A fault of a query whose names are valid.
     pub mixed: Option<QueryError>,
+    /// Its comparisons of columns with constants.
+    pub comparisons: Comparisons,
 }
 
 /// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
@@ -87,8 +90,10 @@ impl CheckedQuery {
         let columns = |source: &Source| source.columns.iter().cloned().zip(source.units.iter().cloned()).collect();
         let tables = sources.iter().map(|source| (source.name.clone(), columns(source))).collect();
         let units = units(&query, &tables);
+        let read = sources.iter().filter(|source| check.read.contains(&source.name)).collect();
+        let comparisons = Comparisons::of(&mut query, read);
         walk(query.as_mut(), &mut PolarsDialect { words });
-        Ok(CheckedQuery { query, units, read: check.read, mixed: check.mixed })
+        Ok(CheckedQuery { query, units, read: check.read, mixed: check.mixed, comparisons })
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod answer;
 mod checked_query;
+mod comparisons;
 mod filter;
 mod groups;
 mod scan;
@@ -26,6 +27,7 @@ use crate::table;
 
 pub use answer::{Answer, AnswerError, Format};
 use checked_query::CheckedQuery;
+pub use comparisons::Comparisons;
 pub use scan::is_unreadable;
 pub use source::Source;
 
@@ -152,7 +154,7 @@ impl Tables {
         let units = columns.iter().map(unit).collect();
         let streaming = streaming::streaming(&checked.query, &self.sources);
         let streaming = streaming.filter(|streaming| streaming.names == columns);
-        Ok(Answer { columns, units, frame, streaming })
+        Ok(Answer { columns, units, comparisons: checked.comparisons, frame, streaming })
     }
 
     /// The error of a query that failed during its computation, if the query is to blame: it also fails on the first rows alone, such as a sum

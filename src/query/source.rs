@@ -9,6 +9,7 @@ use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult}
 use polars_io::SerReader;
 use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 
+use super::comparisons::Comparisons;
 use super::scan::Files;
 use super::{Absent, Answer, QueryError, Tables};
 use crate::dataset::Folder;
@@ -149,7 +150,8 @@ impl Source {
     /// If the table cannot be read.
     pub fn first(&self, count: u32) -> Result<Answer, QueryError> {
         let (columns, units) = (self.columns.clone(), self.units.clone());
-        Ok(Answer { columns, units, frame: self.frame.clone().limit(count), streaming: None })
+        let frame = self.frame.clone().limit(count);
+        Ok(Answer { columns, units, comparisons: Comparisons::default(), frame, streaming: None })
     }
 }
 

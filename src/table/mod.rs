@@ -22,6 +22,7 @@ use std::ops::Range;
 
 use crate::grid::{Block, Grid, Point, Quantity, RowIndex, Tuples};
 use crate::model::Friction;
+use crate::protocol::Status;
 
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
@@ -141,6 +142,23 @@ pub const REDUCED: [(&str, &Table); 3] =
 /// The table with this name, including those of [`REDUCED`].
 pub fn find(name: &str) -> Option<&'static Table> {
     ALL.into_iter().chain(REDUCED.map(|(_, table)| table)).find(|table| table.name() == name)
+}
+
+/// The words that `column` of a table can have; empty for a number, and for a label of a file of points.
+pub fn vocabulary(table: &str, column: &str) -> Vec<&'static str> {
+    if column == STATUS {
+        return Status::ALL.iter().map(|status| status.name()).collect();
+    }
+    if let Some(quantity) = Quantity::from_name(column) {
+        return quantity.words();
+    }
+    match find(table)
+        .and_then(|table| table.columns().iter().find(|known| known.name == column))
+        .map(|column| column.kind)
+    {
+        Some(Kind::Label(words)) => words.to_vec(),
+        _ => Vec::new(),
+    }
 }
 
 /// `table` over a grid: without the axis `law` and without a velocity ceiling, `gap` and `best_cubic` have neither axis.

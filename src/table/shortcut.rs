@@ -57,7 +57,7 @@ const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
 /// One row for each transition, duration, family and friction ceiling.
 pub static SHORTCUT: Table = Table {
     name: "shortcut",
-    doc: "the shortcut of a family",
+    doc: "the shortcut of a family; only bounded_friction depends on tau_ceiling",
     axes: &[Time, A, B, InitialVelocity, FinalVelocity, Quantity::Family, FrictionCeiling],
     columns: &COLUMNS,
     rows_per_part: 1 << 14,

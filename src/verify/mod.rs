@@ -32,6 +32,7 @@ use crate::model::{Friction, Units};
 use crate::sweep::{self, AxisSpec, Spec};
 use crate::table;
 use checked_row::{Checked, CheckedRow, Context, Difference};
+use sample::Sample;
 pub(crate) use units::scale;
 
 /// Difference above which a number is an error, in units of `rtol`. Chosen: room for the errors of the second route.
@@ -54,6 +55,8 @@ pub struct Audit {
     pub worst: Vec<Worst>,
     /// Rows that were not checked, by reason.
     pub unchecked: IndexMap<&'static str, u64>,
+    /// What is wrong with a part that cannot be read; its rows are not checked.
+    pub fault: Option<String>,
 }
 
 /// The greatest difference in a column.
@@ -80,7 +83,7 @@ pub struct VerifyError(String);
 ///
 /// # Errors
 ///
-/// A manifest without a valid spec, or a part that cannot be read.
+/// A manifest without a valid spec, or no row of the sample that is computed yet.
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
     let spec = Spec::parse(&manifest.spec)
         .map_err(|error| VerifyError(format!("the spec in the manifest cannot be read: {error}")))?;
@@ -93,8 +96,8 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let own = spec.tables.get(key).and_then(|table| table.rtol);
         let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
         let rtol = rtol.unwrap_or(spec.accuracy.rtol);
-        let (mut rows, missing) = sample::rows(&folder, manifest, table, sample, seed).map_err(VerifyError)?;
-        let relative = relative(&spec, &folder, table)?;
+        let Sample { mut rows, missing, fault } = sample::rows(&folder, manifest, table, sample, seed);
+        let relative = if rows.is_empty() { [false; 2] } else { relative(&spec, &folder, table)? };
         let friction = sweep::friction(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
         let bounded = spec.model.velocity_bound && friction == Friction::Log;
         let context = Context { bounded, friction, relative, rtol };
@@ -110,6 +113,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             errors: 0,
             worst: Vec::new(),
             unchecked: IndexMap::new(),
+            fault,
         };
         let check = |row: &mut CheckedRow<'_>| match table.name.as_str() {
             "gap" => gap::check(row),
@@ -135,7 +139,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
         audits.push(audit);
     }
-    if audits.iter().all(|audit| audit.rows == 0 && !audit.unchecked.is_empty()) {
+    if audits.iter().all(|audit| audit.rows == 0 && audit.fault.is_none() && !audit.unchecked.is_empty()) {
         return Err(VerifyError(
             "no row of the sample is in a part that is there\n  help: raise --sample, or compute the parts with `slipsweep run`".to_owned(),
         ));

@@ -26,35 +26,47 @@ fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
     chosen
 }
 
-/// The present rows of the sample, with their global numbers, and the number of rows in missing parts.
-pub fn rows(
-    folder: &Folder,
-    manifest: &Manifest,
-    table: &ManifestTable,
-    count: u64,
-    seed: u64,
-) -> Result<(Vec<(u64, Row)>, u64), String> {
+/// The rows of a sample that can be read.
+#[derive(Debug, Default)]
+pub struct Sample {
+    /// The rows, with their global numbers.
+    pub rows: Vec<(u64, Row)>,
+    /// Number of rows in missing parts.
+    pub missing: u64,
+    /// What is wrong with the first part that cannot be read.
+    pub fault: Option<String>,
+}
+
+/// A sample of `count` rows of a table.
+pub fn rows(folder: &Folder, manifest: &Manifest, table: &ManifestTable, count: u64, seed: u64) -> Sample {
     let chosen = choose(table.rows, count, seed);
-    let (mut found, mut missing) = (Vec::new(), 0);
+    let mut sample = Sample::default();
     let numbers: BTreeSet<u64> = chosen.iter().map(|row| row / table.rows_per_part.max(1)).collect();
     for part in numbers {
         let range = table.rows_of(part);
-        let inside: Vec<u64> = chosen.range(range.clone()).map(|row| row - range.start).collect();
+        let inside = chosen.range(range.clone());
         let path = folder.part(&table.name, part);
-        match folder.state(manifest, &table.name, part, CheckDepth::Footer) {
+        let expected = range.end - range.start;
+        let damaged = |why| State::Damaged { why };
+        let read = match folder.state(manifest, &table.name, part, CheckDepth::Footer) {
             // The numbers of an edited part are compared, too.
-            State::There { .. } | State::Damaged { .. } | State::Foreign { what: PROGRAM, .. } => {}
+            State::There { .. } | State::Damaged { .. } | State::Foreign { what: PROGRAM, .. } => {
+                frame::read_all(&path).map_err(|error| damaged(error.reason))
+            }
             State::Missing => {
-                missing += inside.len() as u64;
+                sample.missing += inside.count() as u64;
                 continue;
             }
-            fault => return Err(folder.fault(&path, fault).to_string()),
+            fault => Err(fault),
+        };
+        let read = read.and_then(|frame| match frame.height as u64 {
+            height if height == expected => Ok(frame),
+            height => Err(damaged(format!("{height} rows; the manifest lists {expected}"))),
+        });
+        match read {
+            Ok(frame) => sample.rows.extend(inside.map(|&row| (row, frame.row((row - range.start) as usize)))),
+            Err(fault) => _ = sample.fault.get_or_insert_with(|| folder.fault(&path, fault).to_string()),
         }
-        let (frame, expected) = (frame::read_all(&path).map_err(|error| error.to_string())?, range.end - range.start);
-        if frame.height as u64 != expected {
-            return Err(format!("{}: {} rows; the manifest lists {expected}", path.display(), frame.height));
-        }
-        found.extend(inside.iter().map(|row| (row + range.start, frame.row(*row as usize))));
     }
-    Ok((found, missing))
+    sample
 }

@@ -85,6 +85,32 @@ fn the_tables_that_are_there_are_read() {
     assert!(code == 1 && message.ends_with("did you mean `results/test`?\n"), "{message}");
 }
 
+/// A comparison that holds for no row by mistake is noted.
+#[test]
+fn comparisons_with_unknown_words_or_rounded_numbers_are_noted() {
+    let folder = small();
+    let asked = |condition: &str, columns: &str| {
+        let query = format!("SELECT {columns} FROM best_cubic WHERE {condition}");
+        let output = slipsweep(folder.path(), &["query", "results/test", &query, "--format", "csv"]);
+        assert_eq!(output.status.code(), Some(0), "{condition}");
+        let text = |bytes| String::from_utf8(bytes).expect("is text");
+        (text(output.stdout), text(output.stderr))
+    };
+    for condition in ["status = 'OK'", "status IN ('ok', 'OK') AND v_f = 3.5", "'OK' <> best_cubic.status"] {
+        let (_, note) = asked(condition, "count(*) AS n");
+        assert!(note.starts_with("note: `status` is never 'OK'; it is one of ok, below_bound, "), "{note}");
+        assert_eq!(note.lines().count(), 1, "{note}");
+    }
+    let (answer, note) = asked("t_f = 0.0370001", "t_f");
+    assert_eq!(answer, "t_f\n");
+    let close = "t_f BETWEEN 0.0370001 * (1 - 1e-6) AND 0.0370001 * (1 + 1e-6)";
+    assert_eq!(note, format!("note: `=` compares all digits of `t_f`; for a rounded number, write {close}\n"));
+    assert_eq!(asked(&close.replace("0.0370001", "0.037"), "t_f"), ("t_f\n0.037\n".to_owned(), String::new()));
+    for condition in ["status = 'ok'", "t_f = 0.037", "v_i = 3"] {
+        assert_eq!(asked(condition, "count(*) > 0 AS found"), ("found\ntrue\n".to_owned(), String::new()));
+    }
+}
+
 #[test]
 fn summaries_state_units() {
     let expected = "\

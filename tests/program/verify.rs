@@ -242,6 +242,13 @@ fn the_parts_that_are_there_are_audited() {
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(text.contains("\noptimal ") && text.contains("\ncrossover "), "{text}");
     assert!(text.contains("their part is missing") && text.contains(" none\n"), "{text}");
+
+    // A damaged part is an error, after the other tables.
+    fs::write(Folder::new(folder.path(), "test").part("optimal", 0), "PAR1").expect("is writable");
+    let output = verify(folder.path(), &[]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && has_rows(&output, "crossover", "6"), "{message}");
+    assert!(message.contains("optimal/part-000000.parquet") && message.contains("\n  help: "), "{message}");
 }
 
 #[test]

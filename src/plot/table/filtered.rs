@@ -14,7 +14,6 @@ use crate::dataset::{Folder, Manifest, ReadError};
 use crate::grid::Quantity;
 use crate::names;
 use crate::plot::{PlotError, label};
-use crate::protocol::Status;
 use crate::sweep::Spec;
 use crate::table::{self, Kind, STATUS};
 
@@ -267,17 +266,10 @@ impl FilteredTable {
         if let Some((_, words)) = self.labels.iter().find(|(name, _)| name == column) {
             return words.clone();
         }
-        if column == STATUS {
-            return Status::ALL.iter().map(|status| status.name().to_owned()).collect();
-        }
-        if let Some(quantity) = Quantity::from_name(column) {
-            return owned(&quantity.words());
-        }
-        let columns = table::find(&self.table).map_or(&[][..], |table| table.columns());
-        match columns.iter().find(|known| known.name == column).map(|known| known.kind) {
-            Some(Kind::Label(words)) => owned(words),
+        let known = table::find(&self.table).map_or(&[][..], |table| table.columns());
+        match known.iter().find(|known| known.name == column).map(|known| known.kind) {
             Some(Kind::Flag) => owned(&["false", "true"]),
-            _ => Vec::new(),
+            _ => owned(&table::vocabulary(&self.table, column)),
         }
     }
 

@@ -114,7 +114,7 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     }
     let leaves_out = |panel| is_gap_of_families(filtered, plan, panel) && rows.values(panel).any(|value| value <= 0.0);
     if (0..plan.y.len()).any(leaves_out) {
-        notes.push("Gaps below zero, of steps that have not arrived, are not drawn.".to_owned());
+        notes.push("Gaps below zero are not drawn.".to_owned());
     }
     let figure = Figure {
         columns: 1,
