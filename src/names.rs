@@ -1,9 +1,30 @@
-//! Suggestions for misspelt names.
+//! Text for messages: numbers, foreign text, and suggestions for misspelt names.
 
 use std::borrow::Cow;
 
 /// Greatest length of a name with a suggestion, in bytes. Chosen: three times the longest valid name.
 const MAX_NAME_BYTES: usize = 64;
+
+/// `value` to nine significant digits.
+pub fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let scientific = format!("{value:.8e}");
+    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if (-4..9).contains(&exponent) {
+        let decimals = usize::try_from(8 - exponent).unwrap_or(0);
+        trimmed(&format!("{value:.decimals$}")).to_owned()
+    } else {
+        format!("{}e{exponent}", trimmed(digits))
+    }
+}
+
+/// Removes trailing zeros of the decimals.
+pub fn trimmed(digits: &str) -> &str {
+    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
+}
 
 /// The first `most` characters of a foreign text, without control characters, for a message.
 pub fn shown(text: &str, most: usize) -> Cow<'_, str> {

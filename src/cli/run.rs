@@ -117,7 +117,10 @@ fn report(
     for ((table, statistics), done) in plan.tables.iter().zip(&outcome.statistics).zip(&outcome.tables) {
         let all = done.kept + done.made;
         match shard {
-            None => text.push_str(&summary::statistics(&table.name, table.rows, statistics)),
+            None => {
+                text.push_str(&summary::statistics(&table.name, table.rows, statistics));
+                text.push_str(&summary::infeasibility(folder.path(), &table.name, statistics));
+            }
             Some(shard) => {
                 let (ours, parts) = (words::count(all), words::things(table.parts, "part"));
                 let (index, count) = (shard.index(), shard.count());

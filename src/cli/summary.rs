@@ -1,8 +1,9 @@
 //! `slipsweep summary DATASET`: the summary that `run` prints at its end, from the footers of the parts.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 
+use super::trace::traced;
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
 use crate::dataset::{
@@ -11,6 +12,7 @@ use crate::dataset::{
 use crate::grid::Quantity;
 use crate::protocol::Status;
 use crate::table::{self, STATUS};
+use crate::trace::TABLES;
 
 /// Arguments of `summary`.
 #[derive(Debug, clap::Args)]
@@ -34,6 +36,7 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
             text.push('\n');
         }
         text.push_str(&statistics(&table.name, table.rows, &table.statistics));
+        text.push_str(&infeasibility(&arguments.dataset, &table.name, &table.statistics));
         let missing = table.parts - table.there;
         if missing > 0 {
             let (missing, all) = (words::count(missing), words::things(table.parts, "part"));
@@ -126,6 +129,18 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
         blocks.push(SummaryBlock::Line(2, help.to_owned()));
     }
     blocks
+}
+
+/// Why the first row of a table without any feasible row is infeasible, on a line; empty for other tables.
+pub fn infeasibility(dataset: &Path, name: &str, statistics: &TableStatistics) -> String {
+    let infeasible = statistics.status[Status::Infeasible as usize];
+    if infeasible == 0 || infeasible < statistics.status.iter().sum() || !TABLES.contains(&name) {
+        return String::new();
+    }
+    let row = [&*dataset.to_string_lossy(), name, "--row", "0"].map(str::to_owned);
+    let Err(failure) = traced(&row) else { return String::new() };
+    let reason = failure.message.split_once(&format!("row 0 of `{name}`: ")).map(|(_, reason)| reason);
+    reason.map_or_else(String::new, |reason| format!("  row 0 is infeasible: {reason}\n"))
 }
 
 /// Whether a shortcut costs less than the optimum under a velocity ceiling, which only a faster one can.

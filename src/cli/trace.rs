@@ -446,10 +446,9 @@ impl Arguments {
             return Failure { code, message: format!("error: no `{}` protocol: {absence}", request.name) };
         };
         // The help names options of a protocol.
-        let reason = absence.to_string();
+        let reason = absence.text(&request.units);
         let reason = reason.lines().next().unwrap_or_default();
-        let note = if request.units == Units::Scaled { "" } else { " (dimensionless)" };
-        Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}{note}", self.subject) }
+        Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}", self.subject) }
     }
 
     /// The protocol, its trace, and the effects of a disturbance if one is requested.

@@ -4,28 +4,9 @@ use std::iter;
 
 use indicatif::HumanCount;
 
+pub use crate::names::number;
+use crate::names::trimmed;
 use crate::protocol::Status;
-
-/// `value` to nine significant digits.
-pub fn number(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let scientific = format!("{value:.8e}");
-    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
-    let exponent: i32 = exponent.parse().unwrap_or(0);
-    if (-4..9).contains(&exponent) {
-        let decimals = usize::try_from(8 - exponent).unwrap_or(0);
-        trimmed(&format!("{value:.decimals$}")).to_owned()
-    } else {
-        format!("{}e{exponent}", trimmed(digits))
-    }
-}
-
-/// Removes trailing zeros of the decimals.
-fn trimmed(digits: &str) -> &str {
-    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
-}
 
 /// `count` with a comma between thousands.
 pub fn count(count: u64) -> String {

@@ -226,6 +226,19 @@ impl Quantity {
         }
     }
 
+    /// The least and the greatest value of the physical domain (docs/spec.md); `None` if it depends on other quantities alone.
+    pub fn physical(self) -> Option<[f64; 2]> {
+        match self {
+            Quantity::A => Some([1e-3, 0.3]),
+            Quantity::B => Some([0.0, 0.5]),
+            Quantity::InitialVelocity | Quantity::FinalVelocity => Some([1.001, 1e10]),
+            Quantity::Time => Some([0.0, 1e4]),
+            // `k/a` from 1e-4 to 1e5.
+            Quantity::Stiffness => Some([1e-7, 3e4]),
+            _ => None,
+        }
+    }
+
     /// Whether a table has its column only if the grid names the axis. Without it, its quantity has the default value.
     pub fn is_tacit(self) -> bool {
         matches!(self, Quantity::Law | Quantity::LawEps)

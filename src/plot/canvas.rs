@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::label::{self, FAMILIES, SCRIPT_SIZE, SUBSCRIPT_DROP, SUPERSCRIPT_RISE};
+use crate::names::trimmed;
 
 /// Points per millimetre. Derived: 72 points and 25.4 mm to the inch.
 pub const MILLIMETRE: f64 = 72.0 / 25.4;
@@ -82,7 +83,7 @@ pub struct Canvas {
 /// A coordinate, to a hundredth of a point.
 fn at(value: f64) -> String {
     let text = format!("{:.2}", if value.is_finite() { value.clamp(-1e5, 1e5) } else { 0.0 });
-    match label::trimmed(&text) {
+    match trimmed(&text) {
         "-0" => "0".to_owned(),
         text => text.to_owned(),
     }

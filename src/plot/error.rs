@@ -57,7 +57,7 @@ pub enum PlotError {
     NoColumn { argument: String, table: String, what: &'static str, name: String, found: Vec<String> },
     /// A condition that cannot be read.
     #[error(
-        "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them; several of them separated by commas\n  help: such as --where \"a=0.03, v_f>=10\"; `slipsweep query` supports `or` and `in`"
+        "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them, or COLUMN in (VALUE, VALUE); several of them separated by commas\n  help: such as --where \"a=0.03, v_f>=10\""
     )]
     Condition { text: String },
     /// A word for a column of numbers.

@@ -7,6 +7,8 @@ use std::sync::OnceLock;
 
 use ttf_parser::Face;
 
+use crate::names::trimmed;
+
 /// The fonts of every picture, upright and italic: Arimo has the widths of Arial, Helvetica and Liberation Sans, one of which every SVG viewer
 /// has. Their licence is in the same folder.
 pub const FONTS: [&[u8]; 2] = [include_bytes!("fonts/arimo-Regular.ttf"), include_bytes!("fonts/arimo-Italic.ttf")];
@@ -250,11 +252,6 @@ fn digits(values: &[f64]) -> usize {
 
 /// Greatest number of values whose differences determine the number of digits. Chosen: a picture names fewer.
 const MAX_COMPARED_VALUES: usize = 1000;
-
-/// Removes trailing zeros of the decimals.
-pub fn trimmed(digits: &str) -> &str {
-    if digits.contains('.') { digits.trim_end_matches('0').trim_end_matches('.') } else { digits }
-}
 
 /// Breaks a text in markup into lines of at most `most` (in units of the font size), at spaces, but not around an equality sign.
 pub fn wrapped(markup: &str, most: f64) -> Vec<String> {

@@ -624,6 +624,24 @@ impl PolarsDialect {
     }
 }
 
+/// Groups by the new name of a column of a joined table, such as `best` of `c.gap AS best`: polars does not find `c.gap` beside an aggregate of another
+/// column `gap`.
+fn name_keys(select: &mut Select) {
+    let GroupByExpr::Expressions(keys, _) = &mut select.group_by else { return };
+    for key in keys {
+        let Expr::CompoundIdentifier(names) = &*key else { continue };
+        let Some(column) = names.last().cloned() else { continue };
+        let is_renamed = |item: &&mut SelectItem| matches!(item, SelectItem::ExprWithAlias { expr, .. } if expr == key);
+        let Some(item) = select.projection.iter_mut().find(is_renamed) else { continue };
+        match item {
+            SelectItem::ExprWithAlias { alias, .. } if alias.value != column.value => {
+                *key = Expr::Identifier(alias.clone());
+            }
+            _ => *item = SelectItem::UnnamedExpr(key.clone()),
+        }
+    }
+}
+
 /// `expression` as `data_type`.
 pub fn cast(expression: Expr, data_type: DataType) -> Expr {
     Expr::Cast { kind: CastKind::Cast, expr: Box::new(expression), data_type, array: false, format: None }
@@ -638,6 +656,7 @@ impl VisitorMut for PolarsDialect {
                 order_nulls(&mut window.order_by);
             }
         }
+        name_keys(select);
         ControlFlow::Continue(())
     }
 

@@ -90,7 +90,10 @@ const FUNCTIONS: [(&str, &[&str]); 5] = [
     ("stddev(x)", &["std", "stdev", "sd"]),
     ("variance(x)", &["var"]),
     ("quantile_cont(x, 0.9)", &["quantile", "percentile", "percentile_cont", "approx_quantile"]),
-    ("ORDER BY x LIMIT 1 for the row of the least x", &["argmin", "arg_min", "min_by", "argmax", "arg_max", "max_by"]),
+    (
+        "ORDER BY x LIMIT 1 for the row of the least x; QUALIFY row_number() OVER (PARTITION BY g ORDER BY x) = 1 for that of each g",
+        &["argmin", "arg_min", "min_by", "argmax", "arg_max", "max_by"],
+    ),
 ];
 
 impl QueryError {
@@ -178,6 +181,11 @@ impl Tables {
         let line = &*line;
         if line.contains("unable to find column") || line.contains("no column named") {
             let name = line.split(['"', '\'']).nth(1).unwrap_or_default();
+            // polars joins tables with such names.
+            if let Some((column, table)) = name.split_once(':') {
+                let found = format!("`{table}.{column}` with the name of another column");
+                return QueryError::sql(found, "choose a name after AS that no table has");
+            }
             let read = || self.sources.iter().filter(|source| checked.read.contains(&source.name));
             let columns = || read().flat_map(|source| &source.columns).map(String::as_str);
             let is_optional = |source: &&Source| {
@@ -213,7 +221,7 @@ impl Tables {
         if is_internal {
             let found =
                 "a part of the query is not supported, such as EXISTS, SEMI JOIN or a subquery in an expression";
-            return QueryError::sql(found, "write it as a join, with IN, or with WITH");
+            return QueryError::sql(found, "write it as a join, with IN for one column, or with WITH");
         }
         let known = |sign: &str| line.contains(sign);
         let (found, help) = if known("GROUP BY clause") {

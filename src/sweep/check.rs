@@ -11,7 +11,7 @@ use super::friction;
 use super::laws;
 use super::read;
 use super::spec::{Spec, TableSpec};
-use super::units::{UNIT_KEYS, doubt, doubtful_scales, units};
+use super::units::{UNIT_KEYS, doubtful_axes, doubtful_scales, units};
 use crate::file;
 use crate::grid::{Axis, Block, Factor, Grid, Quantity, RTOL, RowIndex, Scale, TooMany, Values};
 use crate::model::{Friction, Units};
@@ -175,7 +175,7 @@ impl Sweep {
         warnings.extend(unused(spec, &grid, &requests));
         for (prefix, block) in prefixes.iter().zip(&grid.blocks) {
             let axes = block.factors.iter().flat_map(|factor| &factor.axes);
-            warnings.extend(axes.filter_map(|axis| doubt(prefix, &grid.units, axis)));
+            warnings.extend(doubtful_axes(prefix, &grid.units, axes));
         }
         read::find_lines(text, &mut warnings);
         Ok(Sweep {

@@ -11,7 +11,7 @@ use super::error::{Faults, SpecError, refuse};
 use super::friction;
 use super::laws;
 use super::spec::{AccuracySpec, ModelSpec};
-use super::units::{doubt, help, legal, units};
+use super::units::{doubtful_axes, help, legal, units};
 use crate::dataset::{Layout, batch};
 use crate::grid::{Axis, Block, Factor, Grid, Quantity, Scale, Values};
 use crate::model::{Friction, Units};
@@ -101,7 +101,7 @@ impl Sweep {
             refuse(table.name(), "more rows than 64 bits can count", "at most 2^64 - 1 rows", help)
         })?;
         let axes = grid.blocks.iter().flat_map(|block| &block.factors).flat_map(|factor| &factor.axes);
-        let warnings = axes.filter_map(|axis| doubt("", &grid.units, axis)).collect();
+        let warnings = doubtful_axes("", &grid.units, axes);
         let sizes = projection.indices().iter().map(|&column| table.columns()[column].size(&grid)).collect();
         let (rows, hash) = (row_index.rows(), OnceLock::new());
         let request = Request { table, projection, rtol, rows, row_index, members: None, hash, sizes };

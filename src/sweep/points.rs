@@ -38,6 +38,10 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
             return Err(fault(format!("{}: neither CSV nor Parquet", path.display()), expected, help));
         }
     };
+    if columns.iter().all(|column| column.is_empty()) {
+        let (expected, help) = ("axis names and at least one point", "add points, or remove `points`");
+        return Err(fault(format!("{}: no points", path.display()), expected, help));
+    }
     let mut factor = Factor::default();
     for Column { name, cells } in columns {
         match cells {
@@ -49,10 +53,6 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
             }
             Cells::Label(_) => return Err(unknown_column(&path.display(), &name)),
         }
-    }
-    if factor.is_empty() {
-        let (expected, help) = ("axis names and at least one point", "add points, or remove `points`");
-        return Err(fault(format!("{}: no points", path.display()), expected, help));
     }
     Ok(factor)
 }
@@ -231,6 +231,13 @@ fn parquet(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
 }
 
 impl Column {
+    fn is_empty(&self) -> bool {
+        match &self.cells {
+            Cells::Axis(_, values) => values.is_empty(),
+            Cells::Label(texts) => texts.places.is_empty(),
+        }
+    }
+
     /// Checks the type of the column of `file` against its name.
     fn check_type(&self, file: &impl Display, kind: &DataType) -> Result<(), SpecError> {
         let is_text = *kind == label();
@@ -339,8 +346,12 @@ fn unknown_column(place: &impl Display, name: &str) -> SpecError {
     let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
     let expected = format!("{}; or a label, a column of text", error.expected);
     let help = match error.help.strip_prefix("did you mean") {
+        _ if super::units::UNIT_KEYS.contains(&name) => {
+            "scales stand in [model]: write a spec for each material, or convert the points to dimensionless values"
+                .into()
+        }
         Some(_) => error.help,
-        None => "remove the column; for a label, write text, such as `s17` for 17".into(),
+        None => "remove the column; for a label, write text, or quotes around the number, such as \"17\"".into(),
     };
     SpecError { found: format!("{place}: {}", error.found).into(), expected: expected.into(), help, ..error }
 }
@@ -417,7 +428,11 @@ fn point(place: &Line<'_>, line: &str, units: &Units, columns: &mut [Column]) ->
     for (Column { name, cells }, cell) in columns.iter_mut().zip(texts) {
         let place = || format!("{place}: column `{name}`");
         match cells {
-            Cells::Label(texts) => texts.push(place, &cell)?,
+            Cells::Label(texts) => {
+                // A cell in quotes is text, also if it reads as a number.
+                texts.has_text |= matches!(cell, Cow::Owned(_)) && !cell.is_empty();
+                texts.push(place, &cell)?;
+            }
             Cells::Axis(quantity, values) => {
                 let words = quantity.words();
                 if !words.is_empty() {

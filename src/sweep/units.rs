@@ -4,6 +4,7 @@ use super::error::{SpecError, refuse};
 use super::spec::{ModelSpec, Spec};
 use crate::grid::{Axis, Quantity, Scale, Values};
 use crate::model::{Scales, Units};
+use crate::names::number;
 
 /// The keys of `[model]` that determine the units.
 pub const UNIT_KEYS: [&str; 5] = ["units", "mu_0", "l", "v_0", "normal_stress"];
@@ -149,21 +150,78 @@ fn is_velocity(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::InitialVelocity | Quantity::FinalVelocity | Quantity::VelocityCeiling)
 }
 
-/// The warning that `axis`, whose key begins with `prefix`, is probably not in SI units, if so.
-pub fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
+/// The warnings on `axes`, whose keys begin with `prefix`: values that are probably in other units, or outside the physical domain.
+pub fn doubtful_axes<'a>(prefix: &str, units: &Units, axes: impl Iterator<Item = &'a Axis>) -> Vec<SpecError> {
+    let axes: Vec<&Axis> = axes.collect();
+    let each = axes.iter().filter_map(|axis| doubt(prefix, units, axis).or_else(|| unphysical(prefix, units, axis)));
+    each.chain(unphysical_slip(prefix, units, &axes)).collect()
+}
+
+/// The warning that an axis is probably not in SI units, if so.
+fn doubt(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
     if *units == Units::Scaled || !is_velocity(axis.quantity) {
         return None;
     }
-    let greatest = match &axis.values {
-        // An infinite ceiling is legal: it means none.
-        Values::List(values) => values.iter().copied().filter(|value| value.is_finite()).fold(0.0, f64::max),
-        Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => first.max(*last),
-    };
+    let [_, greatest] = ends(axis);
     (greatest > MAX_PLAUSIBLE_VELOCITY).then(|| {
         let (key, expected) =
             (format!("{prefix}axes.{}", axis.quantity.name()), "velocities in m/s, because of `units = \"si\"`");
         SpecError::new(key, format!("{greatest:?} m/s is unusually fast"), expected, PROBABLY_SCALED)
     })
+}
+
+/// The help for values outside the physical domain.
+const UNPHYSICAL: &str = "check the unit; outside the physical domain rows may have no numbers";
+
+/// The warning that an axis leaves the physical domain, if so.
+fn unphysical(prefix: &str, units: &Units, axis: &Axis) -> Option<SpecError> {
+    let (quantity, unit) = (axis.quantity, axis.quantity.unit(Scale::Model));
+    let [least, most] = quantity.physical()?;
+    // With room for the conversion of units.
+    let is_inside = |value: f64| value * (1.0 + 1e-9) >= least && value * (1.0 - 1e-9) <= most;
+    let outside = ends(axis).into_iter().find(|end| end.is_finite() && !is_inside(units.scaled(unit, *end)))?;
+    let name = if *units == Units::Scaled { "" } else { units.name(unit) };
+    let name = if name == "1" { "" } else { name };
+    let [least, most] = [least, most].map(|end| number(end * units.size(unit)));
+    let (found, expected) = (format!("{outside:?} {name}"), format!("{least} to {most} {name}"));
+    let found = format!("{} is outside the physical domain", found.trim_end());
+    Some(SpecError::new(format!("{prefix}axes.{}", quantity.name()), found, expected.trim_end(), UNPHYSICAL))
+}
+
+/// Slips `t_f max(v_i, v_f)` of the physical domain, in slip distances.
+const PHYSICAL_SLIPS: [f64; 2] = [1e-3, 1e7];
+
+/// The warning that the slip is outside the physical domain at all points, if so.
+fn unphysical_slip(prefix: &str, units: &Units, axes: &[&Axis]) -> Option<SpecError> {
+    let ends_of = |quantity: Quantity| {
+        let axis = axes.iter().find(|axis| axis.quantity == quantity)?;
+        Some(ends(axis).map(|end| units.scaled(quantity.unit(Scale::Model), end)))
+    };
+    let (t_f, v_i, v_f) =
+        (ends_of(Quantity::Time)?, ends_of(Quantity::InitialVelocity)?, ends_of(Quantity::FinalVelocity)?);
+    let [least, greatest] = [0, 1].map(|end| t_f[end] * v_i[end].max(v_f[end]));
+    let [short, long] = PHYSICAL_SLIPS;
+    let slip = if greatest < short {
+        greatest
+    } else if least > long {
+        least
+    } else {
+        return None;
+    };
+    let found = format!("a slip of t_f max(v_i, v_f) = {} slip distances is outside the physical domain", number(slip));
+    Some(SpecError::new(format!("{prefix}axes.t_f"), found, format!("{short:e} to {long:e}"), UNPHYSICAL))
+}
+
+/// The least and the greatest finite value of an axis; infinite for none.
+fn ends(axis: &Axis) -> [f64; 2] {
+    let of = |values: &[f64]| {
+        let finite = || values.iter().copied().filter(|value| value.is_finite());
+        [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)]
+    };
+    match &axis.values {
+        Values::List(values) => of(values),
+        Values::Linspace { first, last, .. } | Values::Geomspace { first, last, .. } => of(&[*first, *last]),
+    }
 }
 
 /// The units of a dataset with the spec `text`.

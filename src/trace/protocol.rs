@@ -1,9 +1,12 @@
 //! The protocols that can be traced, by name, and their parameters.
 
+use std::fmt;
+
 use super::disturbed::{self, Disturbance, Rest};
 use super::sample;
 use crate::grid::Quantity;
-use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::model::{Friction, Law, StateLaw, Transition, Units};
+use crate::names::number;
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::cubic::Landscape;
 use crate::protocol::optimal::{self, Bounds, Optimum};
@@ -170,11 +173,6 @@ impl Parameter {
     }
 }
 
-/// The bound on the velocity.
-fn bound(bounded: &bool) -> &'static str {
-    if *bounded { "v >= 1" } else { "v > 0" }
-}
-
 /// A positive `value` with six digits, rounded up (`direction` 1) or down (-1).
 fn six_digits(value: f64, direction: f64) -> f64 {
     let nearest = |value: f64| format!("{value:.5e}").parse().unwrap_or(value);
@@ -183,68 +181,118 @@ fn six_digits(value: f64, direction: f64) -> f64 {
     if direction * (near - value) >= 0.0 { near } else { nearest(near + direction * place) }
 }
 
-/// The bound that leaves no protocol of duration `t_f`.
-fn of_ceiling(obstacle: &optimal::Obstacle, t_f: f64) -> String {
-    match obstacle {
-        optimal::Obstacle::Domain => Obstacle::Domain.to_string(),
-        optimal::Obstacle::TooFast { t_least } => {
-            let least = six_digits(*t_least, 1.0);
-            let found = format!("t_f = {t_f} is too short under these ceilings: the least is {least}");
-            format!("{found}\n  help: raise --t-f to at least {least}, or raise the ceilings")
-        }
-        optimal::Obstacle::TooSlow { t_most } => {
-            let greatest = six_digits(*t_most, -1.0);
-            let found = format!("t_f = {t_f} is too long under these ceilings: the greatest is {greatest}");
-            format!("{found}\n  help: lower --t-f to at most {greatest}, or raise the ceilings")
-        }
-        optimal::Obstacle::VCeiling { above } => format!("v_ceiling must be above {above}"),
-        optimal::Obstacle::TauCeiling { above } => format!("tau_ceiling must be above {above}"),
-    }
-}
-
 /// The reason for a missing protocol.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs)]
 pub enum Absence {
     /// The reason given by the family.
-    #[error("{0}")]
     Obstacle(Obstacle),
     /// No protocol is that short.
-    #[error("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", bound(.bounded))]
     Time { t_f: f64, t_min: f64, bounded: bool },
     /// A ceiling leaves no protocol.
-    #[error("{}", of_ceiling(.obstacle, *.t_f))]
     Ceiling { obstacle: optimal::Obstacle, t_f: f64 },
     /// The state cannot arrive.
-    #[error("no protocol arrives from this theta in the time t_left under these bounds")]
     State,
     /// No cubic shortcut keeps `v >= 1` (`bounded`) or `v > 0` in this time.
-    #[error("no cubic shortcut keeps {} in this time", bound(.bounded))]
     Cubic { bounded: bool },
     /// The least work of all cubic shortcuts is approached at the border `v = 0`, not attained.
-    #[error(
-        "no protocol attains the least work without the velocity floor: v falls to 0 somewhere\n  help: remove --unbounded"
-    )]
     Border,
     /// The smooth pieces do not fit.
-    #[error("delta_t is too long: two pieces must fit into t_f, and v must stay well above 0 in them")]
     Pieces,
     /// The velocity becomes infinite, or has too many oscillations to show.
-    #[error("before t_f the velocity becomes infinite, or there are more oscillations than can be shown")]
     Response,
     /// The spring is rigid, under another law than ageing.
-    #[error("on a rigid spring a jump is traced with the ageing law alone\n  help: give the stiffness of a spring")]
     Rigid,
     /// Friction is so low somewhere that the extremal need not be unique, and none was found.
-    #[error("friction is too low: where tau <= max(0, b - a) an optimum is not guaranteed, and none was found")]
     Unproven,
 }
+
+impl fmt::Display for Absence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text(&Units::Scaled))
+    }
+}
+
+impl std::error::Error for Absence {}
 
 impl Absence {
     /// Whether the cause is a defect of slipsweep.
     pub fn is_defect(self) -> bool {
         self == Absence::Obstacle(Obstacle::NotConverged)
     }
+
+    /// The reason, with numbers in `units`; a help follows on a line of its own.
+    pub fn text(&self, units: &Units) -> String {
+        let floor = |bounded: &bool| match (bounded, units) {
+            (true, Units::Scaled) => "v >= 1",
+            (true, Units::Si(_)) => "v >= v_0",
+            (false, _) => "v > 0",
+        };
+        let time = |t: f64| shown(units, t, "l/v_0");
+        let size = units.size("l/v_0");
+        let rounded = |t: f64, direction: f64| time(six_digits(t * size, direction) / size);
+        match self {
+            Absence::Obstacle(Obstacle::Time { t_min }) => {
+                format!("the time is too short for {}: the least is t_min = {}", floor(&true), time(*t_min))
+            }
+            Absence::Obstacle(Obstacle::FrictionAtEnds { friction }) => {
+                let friction = shown(units, *friction, "mu_0 sigma");
+                format!("tau_ceiling must be above the friction of both ends, {friction}")
+            }
+            Absence::Obstacle(obstacle) => obstacle.to_string(),
+            Absence::Time { t_f, t_min, bounded } => {
+                let (t_f, t_min) = (time(*t_f), time(*t_min));
+                format!("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", floor(bounded))
+            }
+            Absence::Ceiling { obstacle, t_f } => match obstacle {
+                optimal::Obstacle::Domain => Obstacle::Domain.to_string(),
+                optimal::Obstacle::TooFast { t_least } => {
+                    let (t_f, least) = (time(*t_f), rounded(*t_least, 1.0));
+                    let found = format!("t_f = {t_f} is too short under these ceilings: the least is {least}");
+                    format!("{found}\n  help: raise --t-f to at least {least}, or raise the ceilings")
+                }
+                optimal::Obstacle::TooSlow { t_most } => {
+                    let (t_f, greatest) = (time(*t_f), rounded(*t_most, -1.0));
+                    let found = format!("t_f = {t_f} is too long under these ceilings: the greatest is {greatest}");
+                    format!("{found}\n  help: lower --t-f to at most {greatest}, or raise the ceilings")
+                }
+                optimal::Obstacle::VCeiling { above } => {
+                    format!("v_ceiling must be above {}", shown(units, *above, "v_0"))
+                }
+                optimal::Obstacle::TauCeiling { above } => {
+                    format!("tau_ceiling must be above {}", shown(units, *above, "mu_0 sigma"))
+                }
+            },
+            Absence::State => "no protocol arrives from this theta in the time t_left under these bounds".to_owned(),
+            Absence::Cubic { bounded } => format!("no cubic shortcut keeps {} in this time", floor(bounded)),
+            Absence::Border => {
+                "no protocol attains the least work without the velocity floor: v falls to 0 somewhere\n  \
+                                help: remove --unbounded"
+                    .to_owned()
+            }
+            Absence::Pieces => {
+                "delta_t is too long: two pieces must fit into t_f, and v must stay well above 0 in them".to_owned()
+            }
+            Absence::Response => {
+                "before t_f the velocity becomes infinite, or there are more oscillations than can be shown".to_owned()
+            }
+            Absence::Rigid => "on a rigid spring a jump is traced with the ageing law alone\n  \
+                               help: give the stiffness of a spring"
+                .to_owned(),
+            Absence::Unproven => {
+                "friction is too low: where tau <= max(0, b - a) an optimum is not guaranteed, and none was found"
+                    .to_owned()
+            }
+        }
+    }
+}
+
+/// A number in `units`, with all its digits; in SI with nine and its unit.
+fn shown(units: &Units, value: f64, unit: &'static str) -> String {
+    if *units == Units::Scaled {
+        return value.to_string();
+    }
+    format!("{} {}", number(value * units.size(unit)), units.name(unit))
 }
 
 impl From<Obstacle> for Absence {

@@ -85,6 +85,25 @@ fn the_tables_that_are_there_are_read() {
     assert!(code == 1 && message.ends_with("did you mean `results/test`?\n"), "{message}");
 }
 
+/// A key of GROUP BY may have a new name beside an aggregate of a column of the same name in another table.
+#[test]
+fn columns_of_joined_tables_are_grouped_under_new_names() {
+    let folder = small();
+    let query = |name: &str| {
+        let (from, key) =
+            ("FROM optimal o JOIN best_cubic c ON o.t_f = c.t_f", "GROUP BY c.work ORDER BY c.work LIMIT 1");
+        format!("SELECT c.work AS {name}, max(o.work) AS most, count(*) AS n {from} {key}")
+    };
+    let asked = |sql: &str| printed(folder.path(), &["query", "results/test", sql, "--format", "csv"]);
+    let least = asked(
+        "SELECT min(c.work) AS best, min(o.work) AS most, 1 AS n FROM optimal o JOIN best_cubic c ON o.t_f = c.t_f",
+    );
+    assert_eq!(asked(&query("best")), least);
+    assert_eq!(asked(&query("work")), least.replace("best", "work"));
+    let (code, message) = refused(folder.path(), &["query", "results/test", &query("v_i")]);
+    assert!(code == 1 && message.contains("choose a name after AS that no table has"), "{message}");
+}
+
 /// A comparison that holds for no row by mistake is noted.
 #[test]
 fn comparisons_with_unknown_words_or_rounded_numbers_are_noted() {

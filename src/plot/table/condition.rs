@@ -25,8 +25,8 @@ const SIGNS: [(&str, Relation); 7] = [
     (">", Relation::Greater),
 ];
 
-/// Relative difference below which numbers are equal. Chosen: nine typed digits identify a number.
-const EQUAL_RTOL: f64 = 1e-9;
+/// Number of digits by which numbers are equal. Chosen: tables on the terminal show nine.
+const EQUAL_DIGITS: i32 = 9;
 
 /// A condition on a column.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,8 +34,8 @@ pub struct Condition {
     /// The column.
     pub column: String,
     relation: Relation,
-    /// The number or word.
-    pub value: String,
+    /// The number or word, or several for `in`.
+    pub values: Vec<String>,
 }
 
 impl Condition {
@@ -47,11 +47,11 @@ impl Condition {
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
         const AND: &str = " and ";
         let is_and = |rest: &str| rest.get(..AND.len()).is_some_and(|start| start.eq_ignore_ascii_case(AND));
-        let (mut all, mut from, mut quote) = (Vec::new(), 0, None);
+        let (mut all, mut from, mut quote, mut depth) = (Vec::new(), 0, None, 0);
         for (place, letter) in text.char_indices() {
-            // A separator in quotes belongs to a word.
+            // A separator in quotes belongs to a word, one in parentheses to a list.
             let separator = match (letter, quote) {
-                ('"' | '\'', None) if text[..place].trim_end().ends_with(['=', '<', '>']) => {
+                ('"' | '\'', None) if text[..place].trim_end().ends_with(['=', '<', '>', '(', ',']) => {
                     quote = Some(letter);
                     continue;
                 }
@@ -59,6 +59,15 @@ impl Condition {
                     quote = quote.filter(|_| letter != opening);
                     continue;
                 }
+                ('(', _) => {
+                    depth += 1;
+                    continue;
+                }
+                (')', _) => {
+                    depth -= 1;
+                    continue;
+                }
+                _ if depth > 0 => continue,
                 (',', _) => ",",
                 (' ', _) if is_and(&text[place..]) => AND,
                 _ => continue,
@@ -77,80 +86,98 @@ impl Condition {
 
     fn one(text: &str) -> Result<Condition, PlotError> {
         let wrong = || PlotError::Condition { text: text.trim().to_owned() };
-        if [" or ", " in "].iter().any(|word| text.to_lowercase().contains(word)) {
-            return Err(wrong());
-        }
         // The first sign; of several at one position, the longest, which comes first in `SIGNS`.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
+        let list = text.to_lowercase().find(" in ").or_else(|| text.to_lowercase().find(" in("));
+        let found = found.chain(list.map(|place| (place, " in".len(), Relation::Equal)));
         let (place, length, relation) = found.min_by_key(|(place, ..)| *place).ok_or_else(wrong)?;
         let (column, typed) = (text[..place].trim(), text[place + length..].trim());
-        let is_quoted = |quote: char| typed.len() > 1 && typed.starts_with(quote) && typed.ends_with(quote);
-        let quoted = ['"', '\''].into_iter().find(|quote| is_quoted(*quote));
-        let value = quoted.map_or(typed, |quote| typed.trim_matches(quote));
-        // A sign in a value without quotes belongs to a second condition.
-        let is_other = quoted.is_none() && value.contains(['<', '>', '=', '!', '&', '|', '"', '\'']);
-        if column.is_empty() || value.is_empty() || is_other {
+        let values = if list == Some(place) {
+            let inside = typed.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).ok_or_else(wrong)?;
+            items(inside).into_iter().map(unquoted).collect()
+        } else {
+            unquoted(typed).map(|value| vec![value])
+        };
+        let values: Vec<String> = values.ok_or_else(wrong)?;
+        if column.is_empty() {
             return Err(wrong());
         }
-        Ok(Condition { column: column.to_owned(), relation, value: value.to_owned() })
+        Ok(Condition { column: column.to_owned(), relation, values })
     }
 
     /// The text of the condition.
     pub fn shown(&self) -> String {
-        self.shown_with(&self.value)
+        match self.values.as_slice() {
+            [value] => format!("{} {} {value}", self.column, self.sign()),
+            several => format!("{} in ({})", self.column, several.join(", ")),
+        }
+    }
+
+    fn sign(&self) -> &'static str {
+        SIGNS.iter().rev().find(|(_, relation)| *relation == self.relation).map_or("=", |(sign, _)| sign)
     }
 
     /// Whether a number meets the condition; NaN never does.
     pub fn holds(&self, cell: f64) -> bool {
-        let Ok(value) = self.value.parse::<f64>() else { return false };
-        // A finite number does not equal an infinite one.
-        let difference = (cell - value).abs();
-        let equal = cell == value || difference.is_finite() && difference <= EQUAL_RTOL * cell.abs().max(value.abs());
-        match self.relation {
-            Relation::Equal => equal,
-            Relation::Unequal => !equal && !cell.is_nan(),
-            Relation::Less => cell < value && !equal,
-            Relation::AtMost => cell < value || equal,
-            Relation::Greater => cell > value && !equal,
-            Relation::AtLeast => cell > value || equal,
-        }
+        self.numbers().any(|value| {
+            let equal = is_equal(cell, value);
+            match self.relation {
+                Relation::Equal => equal,
+                Relation::Unequal => !equal && !cell.is_nan(),
+                Relation::Less => cell < value && !equal,
+                Relation::AtMost => cell < value || equal,
+                Relation::Greater => cell > value && !equal,
+                Relation::AtLeast => cell > value || equal,
+            }
+        })
     }
 
     /// Whether a number from `low` to `high` may meet the condition.
     pub fn may_hold(&self, low: f64, high: f64) -> bool {
-        let Ok(value) = self.value.parse::<f64>() else { return false };
         match self.relation {
-            Relation::Equal => low <= value && value <= high || self.holds(low) || self.holds(high),
+            Relation::Equal => {
+                self.numbers().any(|value| low <= value && value <= high) || self.holds(low) || self.holds(high)
+            }
             Relation::Unequal => low != high || self.holds(low),
             Relation::Less | Relation::AtMost => self.holds(low),
             Relation::Greater | Relation::AtLeast => self.holds(high),
         }
     }
 
-    /// The number in an equality.
-    pub fn wanted(&self) -> Option<f64> {
-        (self.relation == Relation::Equal).then(|| self.value.parse().ok()).flatten()
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        self.values.iter().filter_map(|value| value.parse().ok())
     }
 
-    /// Whether the value is a number.
+    /// The number in an equality.
+    pub fn wanted(&self) -> Option<f64> {
+        self.word()?.parse().ok()
+    }
+
+    /// Whether the values are numbers.
     pub fn is_of_number(&self) -> bool {
-        self.value.parse::<f64>().is_ok()
+        self.numbers().count() == self.values.len()
     }
 
     /// The word in an equality.
     pub fn word(&self) -> Option<&str> {
-        (self.relation == Relation::Equal).then_some(self.value.as_str())
+        match self.values.as_slice() {
+            [value] if self.relation == Relation::Equal => Some(value),
+            _ => None,
+        }
     }
 
-    /// The text of the condition with another number.
+    /// The text of the condition as typed, with `value` instead of its number.
     pub fn typed(&self, value: Option<f64>) -> String {
-        let value = value.map_or_else(|| self.value.clone(), |value| format!("{value:?}"));
-        self.shown_with(value.strip_suffix(".0").unwrap_or(&value)).replace(' ', "")
-    }
-
-    fn shown_with(&self, value: &str) -> String {
-        let sign = SIGNS.iter().rev().find(|(_, relation)| *relation == self.relation).map_or("=", |(sign, _)| sign);
-        format!("{} {sign} {value}", self.column)
+        let quoted = |value: &String| {
+            if value.contains([' ', ',', '(', ')']) { format!("'{value}'") } else { value.clone() }
+        };
+        match (value, self.values.as_slice()) {
+            (Some(value), _) => format!("{}={}", self.column, format!("{value:?}").trim_end_matches(".0")),
+            (None, [value]) => format!("{}{}{}", self.column, self.sign(), quoted(value)),
+            (None, several) => {
+                format!("{} in ({})", self.column, several.iter().map(quoted).collect::<Vec<_>>().join(", "))
+            }
+        }
     }
 
     /// Whether the cell of a row meets the condition.
@@ -164,11 +191,46 @@ impl Condition {
     /// Whether a word meets the condition.
     pub fn holds_word(&self, word: Option<&str>) -> bool {
         match self.relation {
-            Relation::Equal => word == Some(self.value.as_str()),
-            Relation::Unequal => word.is_some_and(|word| word != self.value),
+            Relation::Equal => word.is_some_and(|word| self.values.iter().any(|value| value == word)),
+            Relation::Unequal => word.is_some_and(|word| self.values.iter().all(|value| value != word)),
             _ => false,
         }
     }
+}
+
+/// Whether a number has the first [`EQUAL_DIGITS`] digits of `value`, rounded. A finite number does not equal an infinite one.
+fn is_equal(number: f64, value: f64) -> bool {
+    // With room for the rounding of the difference.
+    let last_digit = 10f64.powf(value.abs().log10().floor() - f64::from(EQUAL_DIGITS - 1));
+    number == value || value != 0.0 && value.is_finite() && (number - value).abs() <= (0.5 + 1e-6) * last_digit
+}
+
+/// The items of a list, separated by commas outside quotes.
+fn items(list: &str) -> Vec<&str> {
+    let mut quote = None;
+    let separates = |letter: char| match quote {
+        None if letter == '"' || letter == '\'' => {
+            quote = Some(letter);
+            false
+        }
+        None => letter == ',',
+        Some(opening) => {
+            quote = quote.filter(|_| letter != opening);
+            false
+        }
+    };
+    list.split(separates).map(str::trim).collect()
+}
+
+/// A typed value without its quotes; `None` for no value, or a sign outside quotes, which belongs to a second condition.
+fn unquoted(typed: &str) -> Option<String> {
+    let is_quoted = |quote: &char| typed.len() > 1 && typed.starts_with(*quote) && typed.ends_with(*quote);
+    if let Some(quote) = ['"', '\''].iter().find(|quote| is_quoted(quote)) {
+        return Some(typed.trim_matches(*quote).to_owned()).filter(|value| !value.is_empty());
+    }
+    let is_other = typed.contains(['<', '>', '=', '!', '&', '|', '"', '\'', '(', ')']);
+    let is_or = typed.to_lowercase().contains(" or ");
+    (!typed.is_empty() && !is_other && !is_or).then(|| typed.to_owned())
 }
 
 #[cfg(test)]
@@ -228,6 +290,33 @@ mod tests {
         }
     }
 
+    /// All nine digits that a table shows.
+    #[test]
+    fn numbers_are_equal_to_nine_digits() {
+        let holds = |text: &str, number: f64| Condition::all(text).expect("a condition")[0].holds(number);
+        for number in [0.2365756294807403, 1.2139244620058342e-5, 9.8765432149e9, -1.2345678904e-300, 1e300] {
+            let (nine, seven) = (format!("x={number:.8e}"), format!("x={number:.6e}"));
+            assert!(holds(&nine, number) && !holds(&format!("x={:e}", number * (1.0 + 2e-8)), number), "{nine}");
+            assert!(holds(&seven, number) == (number == 1e300), "{seven}");
+        }
+        assert!(holds("x=0", 0.0) && !holds("x=0", 1e-300) && !holds("x=inf", 1e300));
+    }
+
+    #[test]
+    fn lists_hold_for_any_of_their_values() {
+        let conditions = Condition::all("sample in (G1, 'wet, and cold', T2), t_f IN(0.02,0.3) and b>0.01");
+        let conditions = conditions.expect("three conditions");
+        let shown: Vec<String> = conditions.iter().map(Condition::shown).collect();
+        assert_eq!(shown, ["sample in (G1, wet, and cold, T2)", "t_f in (0.02, 0.3)", "b > 0.01"]);
+        assert_eq!(conditions[0].typed(None), "sample in (G1, 'wet, and cold', T2)");
+        for (word, is_in) in [("G1", true), ("wet, and cold", true), ("G2", false)] {
+            assert_eq!(conditions[0].holds_word(Some(word)), is_in);
+        }
+        assert!(conditions[1].holds(0.3) && !conditions[1].holds(0.1));
+        assert!(conditions[1].may_hold(0.2, 0.4) && !conditions[1].may_hold(0.04, 0.2));
+        assert_eq!(Condition::all("sample=weakening G1").expect("a condition")[0].typed(None), "sample='weakening G1'");
+    }
+
     #[test]
     fn what_is_no_condition_is_refused() {
         for text in [
@@ -240,7 +329,11 @@ mod tests {
             "a=1 && b=2",
             "a=1 or b=2",
             "a=1 OR b=2",
-            "a IN (1)",
+            "a=1 or 2",
+            "a in 1",
+            "a in ()",
+            "a in (1",
+            "a in (1,)",
             "a='x",
         ] {
             assert!(matches!(Condition::all(text), Err(PlotError::Condition { .. })), "{text}");

@@ -153,10 +153,10 @@ impl FilteredTable {
             let columns = table::find(name).map_or(&[][..], |table| table.columns());
             let kind = columns.iter().find(|column| column.name == condition.column).map(|column| column.kind);
             if let Some(Kind::Label(words)) = kind
-                && !words.contains(&condition.value.as_str())
+                && let Some(word) = condition.values.iter().find(|word| !words.contains(&word.as_str()))
             {
                 let (text, column) = (condition.shown(), condition.column.clone());
-                return Err(PlotError::NotWord { text, column, word: condition.value.clone(), words });
+                return Err(PlotError::NotWord { text, column, word: word.clone(), words });
             }
         }
         let known = table::find(name).map_or(&[][..], |table| table.axes());

@@ -9,6 +9,7 @@ use crate::model::arcsinh::{LOG_LEVEL, friction_rise, reduction, scaled_friction
 use crate::numerics::MIN_INVERTIBLE;
 use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::gauss::rule;
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
 use crate::numerics::turning::turning;
 use crate::protocol::SolverStats;
@@ -191,6 +192,27 @@ impl Point {
     }
 }
 
+/// `f (u - 1) - [tau(L_1 + p) - tau(L_1)]/a` at `p = ln u` and the level `L_1 = steady`.
+fn surplus(steady: f64, p: f64) -> f64 {
+    if p.abs() > NEAR_STEADY {
+        return reduction(steady + p).0 * exp_m1(p) - friction_rise(steady, p);
+    }
+    // Both terms agree to first order in p: the integral of the slope does not cancel.
+    let (half, rule) = (0.5 * p, rule(NODES));
+    let nodes = rule.x.iter().zip(&rule.w);
+    half * nodes.map(|(x, w)| w * surplus_slope(steady, half * (1.0 + x))).sum::<f64>()
+}
+
+/// The derivative of [`surplus`] with respect to `p`.
+fn surplus_slope(steady: f64, p: f64) -> f64 {
+    let (f, rest) = reduction(steady + p);
+    exp_m1(p) * f * (1.0 + rest)
+}
+
+/// `|ln u|` up to which [`surplus`] is an integral, and the nodes of that. Derived: the singularities `pi/2` beside the real axis leave `12^-16`.
+const NEAR_STEADY: f64 = 0.5;
+const NODES: usize = 8;
+
 /// `ln u` at the level `steady` of `u = 1`, where `tau/a + f (1 - u) = target` and `deficit` is how far this is below steady friction; below 0 if
 /// theta `rises`.
 fn velocity(steady: f64, target: f64, deficit: f64, rises: bool) -> Option<f64> {
@@ -202,10 +224,9 @@ fn velocity(steady: f64, target: f64, deficit: f64, rises: bool) -> Option<f64> 
     if (steady + guess).min(steady) > LOG_LEVEL {
         return Some(guess);
     }
-    let near = |p: f64, size: f64| {
-        let (f, rest) = reduction(steady + p);
-        let value = deficit + friction_rise(steady, p) - f * exp_m1(p);
-        Probe { value: value / size, slope: -exp_m1(p) * f * (1.0 + rest) / size }
+    let near = |p: f64, size: f64| Probe {
+        value: (deficit - surplus(steady, p)) / size,
+        slope: -surplus_slope(steady, p) / size,
     };
     if !rises {
         let probe = |p: f64| {

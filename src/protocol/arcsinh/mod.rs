@@ -40,7 +40,7 @@ struct Problem {
 /// The optimum of duration `t_f`, to rounding.
 ///
 /// `Infeasible` unless `t_f` is above [`least_time`], and outside the domain (`a > 0`, `b >= 0`, `v_i, v_f > 0`, `t_f > 0`, all finite). `Unproven`
-/// where steady friction at the least theta is at most `(b - a) tanh(tau/a)`, which needs `b > 2 a`: extremals need not be unique there.
+/// where steady friction at the least theta is at most `(b - a) tanh(tau/a)`, but for rounding, which needs `b >= 2 a`: extremals need not be unique there.
 pub fn solve(transition: &Transition, t_f: f64) -> Solved<Regularised> {
     extremal(transition, t_f).map(|(found, _)| found)
 }
@@ -90,11 +90,11 @@ impl Problem {
         ((v_i - v_f) / v_i / v_f).max(0.0)
     }
 
-    /// Whether `tau_ss(theta)/theta` falls with theta everywhere, so that each Hamiltonian has one turning point.
+    /// Whether `tau_ss(theta)/theta` falls with theta everywhere, beyond rounding, so that each Hamiltonian has one turning point.
     fn is_proven(&self) -> bool {
         let law = self.transition.law;
         let level = steady_level(&law, self.ln_from.min(self.ln_to));
-        law.a * scaled_friction(level) > (law.b - law.a) * reduction(level).0
+        law.a * scaled_friction(level) * (1.0 - MIN_SLOPE) > (law.b - law.a) * reduction(level).0
     }
 
     /// The member `q` of the family, in which duration rises with `q`.
@@ -182,6 +182,9 @@ impl Problem {
         optimum.work.is_finite().then_some((Regularised { optimum, slopes }, member))
     }
 }
+
+/// Least relative slope of `tau_ss(theta)/theta` of a proven optimum. Derived: the velocity keeps twelve digits.
+const MIN_SLOPE: f64 = 1e-4;
 
 /// `-q` above which the start counts by its velocity. Chosen: the turning point is then at `e` times theta, far from the extremal.
 const TURNING_CHART_END: f64 = 1.0;

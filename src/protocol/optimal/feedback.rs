@@ -16,8 +16,8 @@ use crate::protocol::{Motion, Solved, SolverStats, Status};
 
 /// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
 ///
-/// `Infeasible` where no protocol arrives in time under the bounds, and outside the domain: `theta > 0`, below 1 with the
-/// floor.
+/// `Infeasible` where no protocol arrives in time under the bounds, and outside the domain. For `theta >= 1`, older than any steady
+/// state, it is the protocol without the floor: `BelowBound` where that is below 1.
 pub fn feedback_at(
     law: Law,
     theta: f64,
@@ -69,13 +69,12 @@ fn waiting_gain(problem: &Problem, path: &Path) -> Option<f64> {
 fn posed(law: Law, theta: f64, t_left: f64, v_f: f64, bounds: &Bounds) -> Option<(Problem, Ceilings)> {
     let numbers = [law.a, law.b, theta, t_left, v_f].iter().all(|x| x.is_finite());
     let inside = law.a > 0.0 && law.b >= 0.0 && theta > 0.0 && t_left > 0.0 && v_f > 1.0;
-    let young = theta < 1.0 || !bounds.floor;
-    if !(numbers && inside && young && bounds.is_valid()) {
+    if !(numbers && inside && bounds.is_valid()) {
         return None;
     }
     let fall = (DoubleDouble::product(theta, v_f) + DoubleDouble::new(-1.0)).high;
     let (from, to) = (Lifetime::with(theta, 1.0 - theta), Lifetime::steady(v_f));
-    let problem = Problem { law, from, to, fall, bounded: bounds.floor };
+    let problem = Problem { law, from, to, fall, bounded: bounds.floor && theta < 1.0 };
     Some((problem, Ceilings::new(law, [1.0 / theta, v_f], problem.depth(), bounds)))
 }
 
