@@ -118,6 +118,10 @@ impl Task {
         };
         // In units of its largest slope the time may be so small that the absolute tolerance of the integrator leaves too few digits.
         let steepest = rate(0.0).abs().max(rate(1.0).abs());
+        if steepest == 0.0 {
+            // Without ceilings.
+            return Some(0.0);
+        }
         let first = time(steepest)?;
         if first.abs() > SMALL_TIME * steepest { Some(first) } else { time(first) }
     }

@@ -251,6 +251,17 @@ fn the_parts_that_are_there_are_audited() {
     assert!(message.contains("optimal/part-000000.parquet") && message.contains("\n  help: "), "{message}");
 }
 
+/// Without ceilings every state is feasible, and all rows are checked.
+#[test]
+fn feedback_without_ceilings_is_checked() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "theta = [0.05, 0.5, 1.5]\nt_left = [0.01, 0.1, 2.0]\na = 0.03\nb = 0.05\nv_f = 10.0\n";
+    run(&sweep(folder.path(), axes, "[tables.feedback]\n"), folder.path(), 1);
+    let output = verify(folder.path(), &[]);
+    assert!(output.status.success() && has_rows(&output, "feedback", "9"), "{}", text(&output));
+    assert!(!text(&output).contains("not checked"), "{}", text(&output));
+}
+
 #[test]
 fn a_folder_without_a_dataset_is_refused() {
     let folder = tempfile::tempdir().expect("is writable");

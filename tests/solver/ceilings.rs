@@ -311,6 +311,22 @@ fn reference_feedback() {
     errors.settle("feedback");
 }
 
+/// From a theta above that of every steady state the protocol is that without the floor, if it does not fall below 1.
+#[test]
+fn feedback_from_old_contacts_has_no_floor() {
+    let law = Law { a: 0.03, b: 0.05 };
+    for theta in [1.0, 1.5, 100.0] {
+        for t_left in [1e-3, 0.01, 0.5, 20.0] {
+            let [found, free] = [true, false].map(|floor| feedback_at(law, theta, t_left, 10.0, floor, 1e-10));
+            assert_eq!((found.status, found.value), (free.status, free.value), "{theta} {t_left}");
+            let v = found.value.expect("has numbers").v;
+            assert_eq!(found.status, if v < 1.0 { Status::BelowBound } else { Status::Ok }, "{theta} {t_left}");
+        }
+    }
+    let v = feedback_at(law, 1.5, 0.01, 10.0, true, 1e-10).value.expect("is ok").v;
+    assert!((v / 194.548809 - 1.0).abs() < 1e-8, "{v}");
+}
+
 /// Friction falls below `b - a`, that of steady sliding is at least `2 (b - a)`: works of tests/reference/ceilings.py to 20 digits.
 #[test]
 fn reference_optima_proven_although_friction_is_low() {

@@ -108,8 +108,13 @@ impl Extremal {
             }
             Chart::Turning { ln_theta, theta, level, friction } => {
                 let fall = x * x;
-                let deficit = friction_rise(level, -gain * fall) - friction * exp_m1(-fall);
                 let target = friction * exp(-fall);
+                // Far from the turning point both terms fall by decades, and close to it they hardly differ.
+                let deficit = if fall > 0.5 {
+                    scaled_friction(level - gain * fall) - target
+                } else {
+                    friction_rise(level, -gain * fall) - friction * exp_m1(-fall)
+                };
                 let ln_u = velocity(level - gain * fall, target, deficit, x < 0.0)?;
                 let level = level - gain * fall + ln_u;
                 let (ln_theta, theta) = (ln_theta - fall, theta * exp(-fall));
@@ -209,9 +214,10 @@ fn surplus_slope(steady: f64, p: f64) -> f64 {
     exp_m1(p) * f * (1.0 + rest)
 }
 
-/// `|ln u|` up to which [`surplus`] is an integral, and the nodes of that. Derived: the singularities `pi/2` beside the real axis leave `12^-16`.
-const NEAR_STEADY: f64 = 0.5;
-const NODES: usize = 8;
+/// `|ln u|` up to which [`surplus`] is an integral, and the nodes of that. Derived: the difference loses one digit beyond; the singularities
+/// `pi/2` beside the real axis leave `120^-8`.
+const NEAR_STEADY: f64 = 0.05;
+const NODES: usize = 4;
 
 /// `ln u` at the level `steady` of `u = 1`, where `tau/a + f (1 - u) = target` and `deficit` is how far this is below steady friction; below 0 if
 /// theta `rises`.

@@ -9,6 +9,7 @@ mod motion;
 mod smooth_piece;
 
 use super::control::{Tolerance, ValueRange};
+use super::error::TIGHTEST_RTOL;
 use super::optimal::{PathPoint, Route, route};
 use super::{Motion, Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
@@ -94,21 +95,20 @@ fn assemble(
     let (solved, route) = route(&Transition { law: slider.law, v_i, v_f }, t_f, bounded, rtol);
     let mut stats = solved.stats;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, stats) };
-    let mut sum = Assembly {
-        slider: *slider,
-        rtol,
-        segments: Vec::new(),
-        excess: 0.0,
-        replaced: 0.0,
-        friction_min: f64::INFINITY,
-        v: ValueRange::NONE,
-        control: ValueRange::NONE,
+    let mut gather = |rtol| Assembly::new(slider, rtol).gather(&route, (v_i, v_f), (delta_t, t_f), &mut stats);
+    // A small excess is the difference of two works, which need more digits.
+    let gathered = gather(rtol).and_then(|sum| match SPARE_ACCURACY * sum.excess.abs() / sum.replaced {
+        fraction if fraction < 1.0 => gather((fraction * rtol).max(TIGHTEST_RTOL)),
+        _ => Ok(sum),
+    });
+    let mut sum = match gathered {
+        Ok(sum) => sum,
+        Err(status) => {
+            // Where the optimum need not be unique, it need not be exact enough for pieces either.
+            let doubtful = is_doubtful(solved.status) && status == Status::NotConverged;
+            return none(if doubtful { Status::Unproven } else { status }, stats);
+        }
     };
-    if let Err(status) = sum.gather(&route, (v_i, v_f), (delta_t, t_f), &mut stats) {
-        // Where the optimum need not be unique, it need not be exact enough for pieces either.
-        let doubtful = is_doubtful(solved.status) && status == Status::NotConverged;
-        return none(if doubtful { Status::Unproven } else { status }, stats);
-    }
     if slider.k == f64::INFINITY {
         sum.control = sum.v;
     }
@@ -137,6 +137,10 @@ fn is_doubtful(status: Status) -> bool {
     matches!(status, Status::Unproven | Status::NegativeFriction)
 }
 
+/// Requested over greatest relative error of the work of the pieces. Measured: a quarter of what the budgets of `work` show (`cargo test --test solver
+/// budgets`).
+const SPARE_ACCURACY: f64 = 30.0;
+
 /// Velocity of a piece, in `v_0`, at least. Chosen: far above the underflow of doubles.
 const MIN_VELOCITY: f64 = 1e-100;
 
@@ -156,15 +160,28 @@ struct Assembly {
 }
 
 impl Assembly {
+    fn new(slider: &SpringBlock, rtol: f64) -> Assembly {
+        Assembly {
+            slider: *slider,
+            rtol,
+            segments: Vec::new(),
+            excess: 0.0,
+            replaced: 0.0,
+            friction_min: f64::INFINITY,
+            v: ValueRange::NONE,
+            control: ValueRange::NONE,
+        }
+    }
+
     /// Adds the pieces and the optimum between them in the order of time; `Err` with the status of a piece without
     /// numbers.
     fn gather(
-        &mut self,
+        mut self,
         route: &Route,
         (v_i, v_f): (f64, f64),
         (delta_t, t_f): (f64, f64),
         stats: &mut SolverStats,
-    ) -> Result<(), Status> {
+    ) -> Result<Assembly, Status> {
         let (leaving, arriving) = (route.after(delta_t), route.before(delta_t));
         let at = |site| PieceEnd::inner(&route.jet(site));
         self.replace(route, (route.first(), PieceEnd::outer(v_i)), (leaving, at(leaving)), stats)?;
@@ -178,7 +195,8 @@ impl Assembly {
             from = end;
         }
         self.keep(route, from, arriving);
-        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), stats)
+        self.replace(route, (arriving, at(arriving)), (route.last(), PieceEnd::outer(v_f)), stats)?;
+        Ok(self)
     }
 
     /// Adds the unchanged optimum between two points.
