@@ -106,7 +106,7 @@ pub struct FilteredTable {
     /// Its labels that vary: text columns from the file of points, and their words.
     labels: Vec<(String, Vec<String>)>,
     /// The labels with one word in all selected rows, and this word.
-    common_labels: Vec<(String, String)>,
+    pub common_labels: Vec<(String, String)>,
     /// The varying axes with one value for each label.
     of_points: Vec<String>,
     /// The axes of the grid.
@@ -241,13 +241,8 @@ impl FilteredTable {
 
     /// Whether a column is a label.
     pub fn is_label(&self, column: &str) -> bool {
-        let common = self.common_labels.iter().map(|(name, _)| name.as_str());
-        self.label_columns().into_iter().chain(common).any(|name| name == column)
-    }
-
-    /// The labels that all selected rows have in common, in markup.
-    pub fn common_labels(&self) -> impl Iterator<Item = String> {
-        self.common_labels.iter().map(|(_, word)| label::literal(word))
+        let common = self.common_labels.iter().map(|(name, _)| name);
+        self.labels.iter().map(|(name, _)| name).chain(common).any(|name| name == column)
     }
 
     /// Columns of a part, without row groups whose statistics exclude the conditions.

@@ -195,7 +195,6 @@ impl Groups {
         let (found, empty) = if found.is_empty() { (empty, found) } else { (found, empty) };
         let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
-        let series = series.map(|axis| if is_of_point(&axis) { of_points[0] } else { axis });
         let shown = choice(&joined(&found, &of_points), most, makes, series);
         let shown: Vec<&FoundGroup> = shown.into_iter().map(|place| &found[place]).collect();
         let named: Vec<Vec<f64>> = shown.iter().map(|group| group.values.clone()).collect();

@@ -300,7 +300,7 @@ fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<(&'static
 
 /// The labels and values common to all rows.
 fn fixed(filtered: &FilteredTable, drawn: &[String]) -> String {
-    let mut words: Vec<String> = filtered.common_labels().collect();
+    let mut words: Vec<String> = filtered.common_labels.iter().map(|(_, word)| label::literal(word)).collect();
     for axis in filtered.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
         match axis.values.as_slice() {
             [one] if !axis.infinite => words.push(axis.text_of(*one)),
