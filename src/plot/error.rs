@@ -79,11 +79,17 @@ pub enum PlotError {
     /// Every axis has a single value.
     #[error("the table `{table}` has a single matching row, which makes no picture\n  help: `slipsweep head` shows it")]
     OneRow { table: String },
+    /// A label as an axis.
+    #[error(
+        "{argument} {label}: a label is no axis\n  expected: a column of numbers\n  help: --y {line} draws a line for each {label}; --where \"{label}=…\" selects one"
+    )]
+    Label { argument: &'static str, label: String, line: String },
     /// A map needs two axes.
     #[error(
-        "--color {column}: a map needs two axes of several values, which the table `{table}` does not have{}", if *.are_words { "\n  help: `slipsweep query` lists the words" } else { "\n  help: --y COLUMN draws lines" }
+        "--color {column}: a map needs two axes of several values, which the table `{table}` does not have\n  found: {found}\n  \
+         help: --y {line} draws lines{}", if *.are_words { "; `slipsweep query` lists the words" } else { "" }
     )]
-    NoMap { table: String, column: String, are_words: bool },
+    NoMap { table: String, column: String, found: String, line: String, are_words: bool },
     /// Traces in different units.
     #[error(
         "the traces differ in the unit of `{column}`\n  found: {} and {}\n  expected: the same units\n  help: draw them one by one, or \

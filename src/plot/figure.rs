@@ -241,11 +241,7 @@ impl Entry {
         let drawn = (0..names.len()).filter(|&place| leaders[place] == place && names.len() > 1);
         let entry = |place| {
             let same = names.iter().zip(leaders).filter(|(_, leader)| **leader == place);
-            let text = match same.map(|(name, _)| name.as_ref()).collect::<Vec<_>>().as_slice() {
-                [first, rest @ ..] if rest.len() > 1 => format!("{first} and {} more", rest.len()),
-                few => few.join("; "),
-            };
-            Entry { key: key(place), text }
+            Entry { key: key(place), text: label::few(&same.map(|(name, _)| name).collect::<Vec<_>>()) }
         };
         drawn.map(entry).collect()
     }

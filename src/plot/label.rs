@@ -182,6 +182,14 @@ pub fn unit(unit: &str) -> String {
     unit.split_inclusive(between).map(typeset).collect()
 }
 
+/// Up to three texts, else the first one and the number of the others.
+pub fn few(texts: &[impl AsRef<str>]) -> String {
+    match texts {
+        [first, rest @ ..] if rest.len() > 2 => format!("{} and {} more", first.as_ref(), rest.len()),
+        few => few.iter().map(AsRef::as_ref).collect::<Vec<_>>().join("; "),
+    }
+}
+
 /// The label of an axis: name, unit and the common power of ten of its numbers.
 pub fn axis(column: &str, of: &str, power: i32) -> String {
     let scale = if power == 0 { String::new() } else { format!("10^{{{}}}", signed(power)) };
@@ -280,6 +288,12 @@ mod tests {
     //! Labels in their final form.
 
     use super::*;
+
+    #[test]
+    fn up_to_three_texts_are_named() {
+        assert_eq!(few(&["a", "b", "c"]), "a; b; c");
+        assert_eq!(few(&["a", "b", "c", "d"]), "a and 3 more");
+    }
 
     #[test]
     fn symbols_and_units_are_typeset() {

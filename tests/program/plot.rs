@@ -404,7 +404,7 @@ fn axes_that_change_together_make_lines_and_sampled_ones_dots() {
 const MATERIAL: &str = "a = 0.03\nb = 0.05\nv_i = 3.0\n";
 
 #[test]
-fn two_axes_are_crossed_and_what_is_left_out_is_said_on_the_terminal() {
+fn two_axes_are_crossed_and_omitted_panels_are_noted() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let spec = "name = \"crossed\"\n[axes]\nt_f = { geomspace = [0.01, 0.04, 5] }\na = 0.03\nb = [0.04, 0.05]\nv_i = 3.0\nv_f = 100.0\n\
@@ -420,7 +420,7 @@ fn two_axes_are_crossed_and_what_is_left_out_is_said_on_the_terminal() {
     for title in ["\ntf = 0.01 l/v0\n", "\ntf = 0.04 l/v0\n", "\nb = 0.04 μ0\n", "\nb = 0.05 μ0\n"] {
         assert_eq!(words.matches(title).count(), 1, "{title} in {words}");
     }
-    assert!(!words.contains("panels"), "{words}");
+    assert!(words.contains("\n8 of 10 panels (tf, b) are shown.\n"), "{words}");
     // A condition on a result leaves a row of each kind in different places: the panels stay apart.
     shown(folder, &["plot", "results/crossed", "--table", "gap", "--where", "gap<1e-4, b=0.05", "--out", "few.svg"]);
     let few = words_of(&read(folder, "few.svg"));
@@ -602,5 +602,113 @@ fn regress_labels_stay_in_the_legend_when_another_axis_varies() {
     assert!(!both.contains("a = "), "{both}");
     shown(folder, &[&lines[..], &["--where", "material=granite"]].concat());
     let one = words(&read(folder, "lines.svg"));
-    assert!(one.contains(", granite\n") && one.contains("\nvf = 50 v0\n"), "{one}");
+    assert!(one.contains("\ngranite, a = ") && one.contains("\nvf = 50 v0\n"), "{one}");
+}
+
+/// Materials in the order of their file, which is not that of their numbers; two pairs have the same `a` or the same `b`.
+const MATERIALS: &str = "sample,a,b\nm1,0.010,0.015\nm2,0.009,0.0125\nm3,0.0085,0.0095\nm4,0.0075,0.011\nm5,0.006,0.010\n\
+                         m6,0.011,0.012\nm7,0.012,0.008\nm8,0.010,0.006\nm9,0.014,0.009\nm10,0.005,0.009\n";
+
+/// A dataset of [`MATERIALS`] in a folder of its own.
+fn materials(axes: &str, tables: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("points.csv"), MATERIALS).expect("is writable");
+    let spec = format!("name = \"m\"\npoints = \"points.csv\"\n[axes]\nv_i = 3.0\nv_f = 100.0\n{axes}\n{tables}\n");
+    fs::write(folder.path().join("spec.toml"), spec).expect("is writable");
+    shown(folder.path(), &["run", "spec.toml", "--quiet"]);
+    folder
+}
+
+/// What the terminal shows, and the words of a picture of [`materials`].
+fn drawn(folder: &Path, arguments: &[&str]) -> (String, String) {
+    let said = shown(folder, &[&["plot", "results/m", "--out", "drawn.svg"], arguments].concat());
+    (said.split_once('\n').expect("a line").1.to_owned(), words(&read(folder, "drawn.svg")))
+}
+
+/// Seven of ten labelled points, evenly spread over the file of points: the picture and the terminal speak of labels.
+#[test]
+fn lines_of_labelled_points_are_an_even_choice_and_the_picture_says_so() {
+    let folder = materials("t_f = { geomspace = [0.01, 0.1, 9] }", "[tables.optimal]");
+    let folder = folder.path();
+    let (said, words) = drawn(folder, &["--table", "optimal", "--y", "work"]);
+    assert_eq!(said, "  7 of 10 lines (sample); choose others with --where\n");
+    let names: Vec<&str> = words.lines().filter(|line| line.starts_with('m')).collect();
+    assert_eq!(names, ["m1", "m3", "m4", "m6", "m7", "m9", "m10"]);
+    assert!(words.contains("\n7 of 10 lines (sample) are shown.\n"), "{words}");
+    let (said, one) = drawn(folder, &["--table", "optimal", "--y", "work", "--where", "sample=m2"]);
+    assert!(said.is_empty() && one.contains("\nm2, a = 0.009 μ0, b = 0.0125 μ0, "), "{said}{one}");
+}
+
+/// Axes of labelled points are points over each other, and no axes of a map over another axis.
+#[test]
+fn labelled_points_are_dots_or_panels() {
+    let folder = materials("t_f = { geomspace = [0.01, 0.1, 9] }", "[tables.optimal]\n[tables.crossover]");
+    let folder = folder.path();
+    // Every point has its dot and its name, those of equal `b` too.
+    for x in ["a", "b"] {
+        let (said, words) = drawn(folder, &["--table", "crossover", "--x", x, "--y", "t_cross"]);
+        let names = words.lines().filter(|line| line.starts_with('m')).count();
+        assert!(said.is_empty() && names == 10, "{said}{words}");
+        assert_eq!(read(folder, "drawn.svg").matches("<circle").count(), 10);
+    }
+    let plot = ["plot", "results/m", "--table", "optimal"];
+    let with = |more: &[&str]| complaint(folder, &[&plot, more].concat());
+    assert_eq!(
+        with(&["--color", "strategy"]),
+        "error: --color strategy: a map needs two axes of several values, which the table `optimal` does not have\n  found: t_f; \
+         the label sample determines a, b\n  help: --y work draws lines; `slipsweep query` lists the words\n"
+    );
+    assert_eq!(
+        with(&["--x", "t_f", "--y", "sample", "--color", "strategy"]),
+        "error: --y sample: a label is no axis\n  expected: a column of numbers\n  help: --y work draws a line for each sample; --where \
+         \"sample=…\" selects one\n"
+    );
+    let folder = materials(
+        "t_f = { geomspace = [0.01, 0.1, 4] }\nv_ceiling = { geomspace = [2000.0, 5000.0, 4] }",
+        "[tables.optimal]",
+    );
+    let (said, words) = drawn(folder.path(), &["--table", "optimal", "--color", "strategy"]);
+    assert_eq!(said, "  9 of 10 panels (sample); choose others with --where\n");
+    assert_eq!(words.lines().filter(|line| line.starts_with('m')).count(), 9, "{words}");
+}
+
+/// Groups without values take no place of those with values.
+#[test]
+fn groups_with_values_are_preferred() {
+    let spec = "[axes]\na = 0.01\nb = 0.015\nv_i = 1e2\nv_f = { geomspace = [2e2, 1e4, 5] }\nk = { geomspace = [1e-4, 1.0, 25] }\n\
+                m = 1e-12\n[tables.step_response]\n";
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    fs::write(folder.join("spec.toml"), format!("name = \"m\"\n{spec}")).expect("is writable");
+    shown(folder, &["run", "spec.toml", "--quiet"]);
+    let (said, words) =
+        drawn(folder, &["--table", "step_response", "--x", "v_f", "--y", "settling_time", "--color", "k"]);
+    let settled = shown(
+        folder,
+        &["query", "results/m", "select count(distinct k) as n from step_response where settling_time is not null"],
+    );
+    let settled: u32 = settled.split_whitespace().last().expect("a number").parse().expect("a number");
+    assert!((8..25).contains(&settled), "{settled}");
+    assert_eq!(said, format!("  7 of {settled} lines (k); choose others with --where\n"));
+    assert_eq!(words.lines().filter(|line| line.starts_with("k = ")).count(), 7, "{words}");
+    assert!(words.contains(&format!(" and {} more.", 25 - settled - 1)), "{words}");
+}
+
+/// The sign of a column shows in a map: by the critical stiffness, or by a line of its own.
+#[test]
+fn maps_of_both_signs_show_where_the_column_is_zero() {
+    let spec = |friction: &str| {
+        format!(
+            "{friction}[axes]\na = 0.01\nb = 0.015\nv_i = 1e5\nv_f = {{ geomspace = [2e5, 1e7, 9] }}\n\
+             k = {{ geomspace = [1e-4, 1e-1, 9] }}\nm = 1e-16\n[tables.stability]\ncolumns = [\"growth_rate\"]\n"
+        )
+    };
+    let (known, svg) = picture("known", &spec(""), "stability");
+    assert!(known.contains("\nkc(vf): growth rate = 0\n") && !known.contains("\ngrowth rate = 0\n"), "{known}");
+    let lines = |svg: &str| svg.matches("stroke=\"#fff\"").count();
+    let (found, other) = picture("found", &spec("[model]\nfriction = \"regularised\"\n"), "stability");
+    assert!(found.contains("\ngrowth rate = 0\n") && !found.contains("kc"), "{found}");
+    assert!(lines(&svg) > 0 && lines(&other) > 0);
+    let (stable, _) = picture("stable", &spec("").replace("b = 0.015", "b = 0.005"), "stability");
+    assert!(!stable.contains("= 0\n"), "{stable}");
 }

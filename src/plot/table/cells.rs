@@ -86,6 +86,13 @@ impl AxisCells {
         (-1e-12..=1.0 + 1e-12).contains(&fraction).then(|| (place.max(0.0) as usize).min(self.len() - 1))
     }
 
+    /// The value at a fraction between the centres of two cells, counted in cells.
+    pub fn value_at(&self, place: f64) -> f64 {
+        let before = (place as usize).min(self.len() - 2);
+        let [low, high] = [before, before + 1].map(|cell| self.scale.fraction(self.middles[cell]));
+        self.scale.value(low + (place - before as f64) * (high - low))
+    }
+
     /// The cell whose centre is nearest to a fraction of the scale.
     pub fn nearest(&self, fraction: f64) -> usize {
         let value = self.scale.value(fraction);

@@ -42,16 +42,14 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
         return choice.map(x, y.to_owned());
     }
     // Lines are named by their labels, with or without a request.
-    let is_label = |name: &&str| y.is_some() && filtered.labels.iter().any(|(label, _)| label == name);
-    let colour = colour.filter(|colour| !is_label(colour));
+    let colour = colour.filter(|colour| y.is_none() || !filtered.is_label(colour));
     let wants_map = colour.filter(|colour| !is_axis(colour));
     let wants_lines = y.is_some() || colour.is_some_and(|colour| is_axis(&colour));
     if !wants_lines && let Some((x, y)) = choice.two_axes(wants_map.is_some())? {
         return choice.map(x, y);
     }
     if let Some(column) = wants_map {
-        let are_words = !filtered.words(column).is_empty();
-        return Err(PlotError::NoMap { table: filtered.table.clone(), column: column.to_owned(), are_words });
+        return Err(choice.no_map(column));
     }
     if let Some(y) = y.filter(|y| !filtered.words(y).is_empty()) {
         return Err(PlotError::Words { column: y.to_owned() });
@@ -84,6 +82,11 @@ impl<'a> Choice<'a> {
         defaults: &'a TablePicture,
         request: &'a Request,
     ) -> Result<Choice<'a>, PlotError> {
+        for (argument, axis) in [("--x", &request.x), ("--y", &request.y)] {
+            if let Some(label) = axis.clone().filter(|axis| filtered.is_label(axis)) {
+                return Err(PlotError::Label { argument, label, line: defaults.line(filtered) });
+            }
+        }
         if let Some(x) = &request.x {
             filtered.check("--x", "axis", x)?;
         }
@@ -112,20 +115,43 @@ impl<'a> Choice<'a> {
         PlotError::OneRow { table: self.filtered.table.clone() }
     }
 
+    /// The error if no two axes make a map.
+    fn no_map(&self, column: &str) -> PlotError {
+        let Choice { filtered, varying, .. } = self;
+        let varying = varying.iter().map(|axis| axis.name.as_str());
+        let (of_points, free): (Vec<&str>, Vec<&str>) = varying.partition(|axis| filtered.is_of_point(axis));
+        let mut found = if free.is_empty() { "none".to_owned() } else { free.join(", ") };
+        if !of_points.is_empty() {
+            let label = filtered.label_columns().join(", ");
+            found.push_str(&format!("; the label {label} determines {}", of_points.join(", ")));
+        }
+        let are_words = !filtered.words(column).is_empty();
+        let line = self.defaults.line(filtered);
+        PlotError::NoMap { table: filtered.table.clone(), column: column.to_owned(), found, line, are_words }
+    }
+
     /// The axes of a map, if two are long enough.
     fn two_axes(&self, wants_map: bool) -> Result<Option<(String, String)>, PlotError> {
         let Choice { filtered, defaults, varying, .. } = self;
         let longest = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
         let is_scattered = defaults.scatters && varying.len() > 1 && filtered.rows <= 2 * longest as u64;
         let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
-        let first = self.request.x.clone().or_else(|| self.find(defaults.x, None, least));
+        // The axes of labelled points are points, not a grid: they make no map with another axis.
+        let is_of_point = |axis: &str| filtered.is_of_point(axis);
+        let has_points = match &self.request.x {
+            Some(x) => is_of_point(x),
+            None => varying.iter().all(|axis| is_of_point(&axis.name)),
+        };
+        let alike = varying.iter().copied().filter(|axis| is_of_point(&axis.name) == has_points).collect();
+        let alike = Choice { varying: alike, ..*self };
+        let first = self.request.x.clone().or_else(|| alike.find(defaults.x, None, least));
         let Some(first) = first.filter(|_| least < usize::MAX) else { return Ok(None) };
         // An axis that changes only with the first one would make a map of a single line. Grid axes are preferred to computed ones.
         let others = [defaults.y, defaults.x].concat();
         let (gridded, computed): (Vec<&str>, Vec<&str>) =
             others.into_iter().partition(|name| filtered.gridded.has(name));
         for second in [gridded, computed].concat() {
-            if let Some(second) = self.find(&[second], Some(&first), least)
+            if let Some(second) = alike.find(&[second], Some(&first), least)
                 && !filtered.follows(&second, &first)?
             {
                 return Ok(Some((first, second)));

@@ -103,8 +103,12 @@ pub struct FilteredTable {
     pub rows: u64,
     /// Number of missing parts.
     pub missing: u64,
-    /// Its labels: text columns from the file of points, and their words.
-    pub labels: Vec<(String, Vec<String>)>,
+    /// Its labels that vary: text columns from the file of points, and their words.
+    labels: Vec<(String, Vec<String>)>,
+    /// The labels with one word in all selected rows, and this word.
+    pub common_labels: Vec<(String, String)>,
+    /// The varying axes with one value for each label.
+    of_points: Vec<String>,
     /// The axes of the grid.
     pub gridded: Gridded,
     /// The gap below which rounding dominates: `rtol` where it is the difference of two works; 0 where it is computed without cancellation.
@@ -139,6 +143,8 @@ impl FilteredTable {
             rows: 0,
             missing,
             labels: Vec::new(),
+            common_labels: Vec::new(),
+            of_points: Vec::new(),
             gridded: Gridded::of(&manifest.spec),
             least_gap: if DIFFERENCES.contains(&name) { rtol(&manifest.spec, name) } else { 0.0 },
             parts,
@@ -168,6 +174,7 @@ impl FilteredTable {
             0 => Err(filtered.without_rows()?),
             _ => {
                 filtered.labels = filtered.read_labels()?;
+                filtered.split_labels()?;
                 Ok(filtered)
             }
         }
@@ -201,6 +208,43 @@ impl FilteredTable {
         Ok(labels)
     }
 
+    /// Sets the labels that all selected rows have in common apart, and finds the axes that depend on the others.
+    fn split_labels(&mut self) -> Result<(), PlotError> {
+        if self.labels.is_empty() {
+            return Ok(());
+        }
+        let is_common = self.determined(&self.label_columns(), &[])?;
+        let mut first = Vec::new();
+        self.each_while(&self.label_columns(), |row| {
+            first = row.to_vec();
+            false
+        })?;
+        for (place, (name, words)) in std::mem::take(&mut self.labels).into_iter().enumerate() {
+            if !is_common[place] {
+                self.labels.push((name, words));
+            } else if !first[place].is_nan() {
+                self.common_labels.push((name, words[first[place] as usize].clone()));
+            }
+        }
+        let varying = self.axes.iter().filter(|axis| axis.varies() && !self.labels.is_empty());
+        let varying: Vec<&str> = varying.map(|axis| axis.name.as_str()).collect();
+        let determined = self.determined(&varying, &self.label_columns())?;
+        self.of_points =
+            varying.into_iter().zip(determined).filter(|(_, is)| *is).map(|(name, _)| name.to_owned()).collect();
+        Ok(())
+    }
+
+    /// Whether an axis varies, with one value for each label: it is one of the axes of labelled points.
+    pub fn is_of_point(&self, axis: &str) -> bool {
+        self.of_points.iter().any(|name| name == axis)
+    }
+
+    /// Whether a column is a label.
+    pub fn is_label(&self, column: &str) -> bool {
+        let common = self.common_labels.iter().map(|(name, _)| name);
+        self.labels.iter().map(|(name, _)| name).chain(common).any(|name| name == column)
+    }
+
     /// Columns of a part, without row groups whose statistics exclude the conditions.
     fn frame(&self, part: &Path, names: &[&str]) -> Result<Frame, PlotError> {
         let may_hold = |range: &dyn Fn(&str) -> Option<(f64, f64)>| {
@@ -221,7 +265,7 @@ impl FilteredTable {
         self.labels.iter().zip(cells).filter_map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// The names of the columns of labels.
+    /// The names of the labels that vary.
     pub fn label_columns(&self) -> Vec<&str> {
         self.labels.iter().map(|(name, _)| name.as_str()).collect()
     }
@@ -265,6 +309,9 @@ impl FilteredTable {
         let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
         if let Some((_, words)) = self.labels.iter().find(|(name, _)| name == column) {
             return words.clone();
+        }
+        if let Some((_, word)) = self.common_labels.iter().find(|(name, _)| name == column) {
+            return vec![word.clone()];
         }
         let known = table::find(&self.table).map_or(&[][..], |table| table.columns());
         match known.iter().find(|known| known.name == column).map(|known| known.kind) {

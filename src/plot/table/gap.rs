@@ -25,7 +25,7 @@ pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigur
     if scene.filtered.table != "gap" || plan.x != ALPHAS[0] || plan.y != ALPHAS[1] {
         return Ok(());
     }
-    let MapFigure { figure, groups, least, cells } = map;
+    let MapFigure { figure, groups, least, cells, .. } = map;
     let stroke = Stroke::solid("#000", 0.9);
     let best = best(scene, groups)?;
     let from_table = best.iter().any(Option::is_some);

@@ -1,10 +1,10 @@
 //! The groups of a table: combinations of the axes that are not drawn in a panel. Each group makes a panel or a line.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::HashMap;
 
 use super::filtered::{FilteredTable, Values, bits};
-use indexmap::IndexMap;
+use indexmap::{IndexMap, IndexSet};
 
 use crate::grid::Quantity;
 use crate::plot::colour::MAX_SERIES;
@@ -21,12 +21,14 @@ const MAX_PANELS: usize = 9;
 const MAX_CROSSED_PANELS: usize = 4;
 
 /// The varying axes that are not drawn and that distinguish rows, and a note on axes that change only with them. A grid axis always
-/// distinguishes rows.
+/// distinguishes rows. Over an axis of labelled points, the label distinguishes rows, not the other axes of these points.
 pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         filtered.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
     let others: Vec<&str> = others.map(|axis| axis.name.as_str()).collect();
-    let mut determined = filtered.determined(&others, drawn)?.into_iter();
+    let is_over_points = !drawn.is_empty() && drawn.iter().all(|name| filtered.is_of_point(name));
+    let labels = if is_over_points { filtered.label_columns() } else { Vec::new() };
+    let mut determined = filtered.determined(&others, &[drawn, &labels].concat())?.into_iter();
     let is_along = |name: &str, is_determined: bool| {
         let gridded = filtered.axis(name).is_some_and(|axis| axis.varies()) && filtered.gridded.is_free(name, drawn);
         is_determined && !gridded
@@ -109,6 +111,15 @@ pub struct Group {
     pub name: String,
 }
 
+/// A group of the rows of a table.
+struct FoundGroup {
+    values: Vec<f64>,
+    /// The label of all its rows, in markup; else empty.
+    label: String,
+    /// Whether a row has a value in the drawn columns.
+    has_value: bool,
+}
+
 /// The groups that are shown.
 #[derive(Debug, Clone)]
 pub struct Groups {
@@ -118,8 +129,14 @@ pub struct Groups {
     pub shown: Vec<Group>,
     /// The total number.
     pub all: usize,
-    /// The number of omitted ones.
+    /// The number of those with a value.
+    with_value: usize,
+    /// The number of omitted ones with a value.
     left_out: usize,
+    /// The names of those without a value, in markup, which are not shown.
+    empty: Vec<String>,
+    /// The axes and labels that distinguish groups.
+    distinguishing: Vec<String>,
     makes: GroupRole,
     /// The titles of the rows and columns of panels, in markup, if two axes are crossed; the groups fill the rows.
     pub crossed: Option<[Vec<String>; 2]>,
@@ -138,103 +155,88 @@ pub enum GroupRole {
 }
 
 impl Groups {
-    /// The groups of the rows of `filtered` as panels over the `drawn` axes, and a note on axes that change only with others.
-    pub fn of_panels(filtered: &FilteredTable, drawn: &[&str]) -> Result<(Groups, Option<String>), PlotError> {
+    /// The groups of the rows of `filtered` as panels of `columns` over the `drawn` axes, and a note on axes that change only with others.
+    pub fn of_panels(
+        filtered: &FilteredTable,
+        drawn: &[&str],
+        columns: &[&str],
+    ) -> Result<(Groups, Option<String>), PlotError> {
         let (further, along) = further(filtered, drawn)?;
-        Ok((Groups::new(filtered, &further, GroupRole::Panels, None)?, along))
+        Ok((Groups::new(filtered, &further, GroupRole::Panels, None, [drawn, columns])?, along))
     }
 
-    /// The groups of the rows of `filtered` over `axes`. If a figure cannot show all of them, all values of `series`, or of the last axis, at one or
-    /// more values of the other axes; beyond `MAX_GROUPS`, one group of all rows. Two independent axes make rows and columns of panels, also for
-    /// pairs without rows.
+    /// The groups of the rows of `filtered` over `axes`, without those that have no value in the columns over the axes `drawn`. If a figure cannot
+    /// show all of them, all values of `series`, or of the last axis, at one or more values of the other axes; beyond `MAX_GROUPS`, one group of all
+    /// rows. Groups have the names of their labels, if each has one, and the order of the file of points; else, two independent axes make rows and
+    /// columns of panels, also for pairs without rows.
     pub fn new(
         filtered: &FilteredTable,
         axes: &[&str],
         makes: GroupRole,
         series: Option<&str>,
+        drawn: [&[&str]; 2],
     ) -> Result<Groups, PlotError> {
-        let found = keys(filtered, axes, makes)?;
+        let found = find(filtered, axes, makes, drawn)?;
         if found.len() > MAX_GROUPS {
-            return Ok(Groups::of(Vec::new(), vec![Group { values: Vec::new(), name: String::new() }], 1, makes));
+            return Groups::new(filtered, &[], makes, None, drawn);
         }
+        let all = found.len();
+        let is_labelled = found.iter().any(|group| !group.label.is_empty());
+        // The axes that labels stand for.
+        let is_of_point = |axis: &usize| is_labelled && filtered.is_of_point(axes[*axis]);
+        let of_points: Vec<usize> = (0..axes.len()).filter(is_of_point).collect();
+        let different = varying(&values_of(&found));
+        let words = |group: &FoundGroup, of: &[usize], has_label: bool| -> Vec<String> {
+            let label = Some(group.label.clone()).filter(|label| has_label && !label.is_empty());
+            let of: Vec<usize> = of.iter().copied().filter(|axis| !is_of_point(axis)).collect();
+            label.into_iter().chain(in_words(filtered, axes, &of, &group.values)).collect()
+        };
+        let (found, empty): (Vec<_>, Vec<_>) = found.into_iter().partition(|group| group.has_value);
+        let (found, empty) = if found.is_empty() { (empty, found) } else { (found, empty) };
         let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
-        let shown: Vec<Vec<f64>> =
-            choice(&found, most, makes, series).into_iter().map(|place| found[place].clone()).collect();
-        let in_words = |of: &[usize], values: &[f64]| in_words(filtered, axes, of, values);
-        let (named, different) = (varying(&shown), varying(&found));
-        let same: Vec<usize> = different.into_iter().filter(|axis| !named.contains(axis)).collect();
-        let held = shown.first().map_or_else(Vec::new, |first| in_words(&same, first));
-        let groups = shown.into_iter().map(|values| Group { name: in_words(&named, &values).join(", "), values });
-        let axes = axes.iter().map(|&axis| axis.to_owned()).collect();
-        let mut groups = Groups { held, ..Groups::of(axes, groups.collect(), found.len(), makes) };
-        if makes == GroupRole::Panels {
-            groups.cross(filtered, &found);
+        let shown = choice(&joined(&found, &of_points), most, makes, series);
+        let shown: Vec<&FoundGroup> = shown.into_iter().map(|place| &found[place]).collect();
+        let named: Vec<Vec<f64>> = shown.iter().map(|group| group.values.clone()).collect();
+        let named = varying(&named);
+        let same: Vec<usize> = different.iter().copied().filter(|axis| !named.contains(axis)).collect();
+        let has_names = shown.iter().any(|group| group.label != shown[0].label);
+        let name = |group: &FoundGroup, of: &[usize], has_label: bool| words(group, of, has_label).join(", ");
+        let group = |group: &&FoundGroup| Group { name: name(group, &named, has_names), values: group.values.clone() };
+        let labels = if is_labelled { filtered.label_columns() } else { Vec::new() };
+        let unlabelled = (0..axes.len()).filter(|axis| !is_of_point(axis)).map(|axis| axes[axis]);
+        let mut groups = Groups {
+            axes: axes.iter().map(|&axis| axis.to_owned()).collect(),
+            shown: shown.iter().map(group).collect(),
+            all,
+            with_value: found.len(),
+            left_out: found.len() - shown.len(),
+            empty: Vec::new(),
+            distinguishing: labels.into_iter().chain(unlabelled).map(str::to_owned).collect(),
+            makes,
+            crossed: None,
+            held: shown.first().map_or_else(Vec::new, |first| words(first, &same, !has_names)),
+            places: HashMap::new(),
+        };
+        groups.places = places_of(&groups.shown);
+        if makes == GroupRole::Panels && !has_names {
+            let values = values_of(&found);
+            let free: Vec<usize> = varying(&values).into_iter().filter(|axis| !is_of_point(axis)).collect();
+            if groups.cross(filtered, &values, &free) {
+                groups.held = words(&found[0], &free[..free.len() - 2], true);
+            }
         }
-        if groups.crossed.is_none() {
-            groups.label(filtered)?;
-        }
+        let is_empty = |group: &&FoundGroup| groups.place(&group.values).is_none();
+        groups.empty = empty.iter().filter(is_empty).map(|group| name(group, &different, true)).collect();
         Ok(groups)
     }
 
-    /// The `shown` groups of `all`, without crossed axes.
-    fn of(axes: Vec<String>, shown: Vec<Group>, all: usize, makes: GroupRole) -> Groups {
-        let (places, left_out) = (places_of(&shown), all - shown.len());
-        Groups { axes, shown, all, left_out, makes, crossed: None, held: Vec::new(), places }
-    }
-
-    /// Names the groups by their labels, if each has one, and by the axes that distinguish groups of one label. Groups are in the order of their
-    /// first rows: that of the file of points. A label common to all groups is stated once.
-    fn label(&mut self, filtered: &FilteredTable) -> Result<(), PlotError> {
-        if filtered.labels.is_empty() || self.shown.len() < 2 {
-            return Ok(());
-        }
-        let columns: Vec<&str> = self.axes.iter().map(String::as_str).chain(filtered.label_columns()).collect();
-        let mut labels = vec![String::new(); self.shown.len()];
-        let (mut is_one, mut order) = (true, Vec::new());
-        filtered.each_while(&columns, |row| {
-            let (group, cells) = row.split_at(self.axes.len());
-            if let Some(place) = self.place(group) {
-                let label = filtered.label(cells);
-                if labels[place].is_empty() {
-                    order.push(place);
-                }
-                is_one = !label.is_empty() && (labels[place].is_empty() || labels[place] == label);
-                labels[place] = label;
-            }
-            is_one
-        })?;
-        let different: HashSet<&String> = labels.iter().filter(|label| !label.is_empty()).collect();
-        if !is_one || order.len() < self.shown.len() {
-            return Ok(());
-        }
-        if let [label] = different.into_iter().collect::<Vec<_>>()[..] {
-            self.held.insert(0, label.clone());
-            return Ok(());
-        }
-        let of_label = |label: &String| -> Vec<Vec<f64>> {
-            let places = (0..labels.len()).filter(|&place| labels[place] == *label);
-            places.map(|place| self.shown[place].values.clone()).collect()
-        };
-        let within: BTreeSet<usize> = labels.iter().flat_map(|label| varying(&of_label(label))).collect();
-        let within: Vec<usize> = within.into_iter().collect();
-        let group = |&place: &usize| {
-            let values = self.shown[place].values.clone();
-            let words = [labels[place].clone()].into_iter().chain(in_words(filtered, &self.axes, &within, &values));
-            Group { name: words.collect::<Vec<_>>().join(", "), values }
-        };
-        self.shown = order.iter().map(group).collect();
-        self.places = places_of(&self.shown);
-        Ok(())
-    }
-
-    /// Crosses the last two varying axes, at the first values of the others.
-    fn cross(&mut self, filtered: &FilteredTable, found: &[Vec<f64>]) {
-        let varying = varying(found);
-        let [.., first, second] = varying.as_slice() else { return };
+    /// Crosses the last two of the axes numbered `varying`, at the first values of the others; whether they are independent.
+    fn cross(&mut self, filtered: &FilteredTable, found: &[Vec<f64>], varying: &[usize]) -> bool {
+        let [.., first, second] = varying else { return false };
         let crossed = [*first, *second];
         let axis = |place: usize| filtered.axis(&self.axes[place]);
-        let [Some(first), Some(second)] = crossed.map(axis) else { return };
+        let [Some(first), Some(second)] = crossed.map(axis) else { return false };
         let is_held = |axis: &usize| !crossed.contains(axis);
         let found_here: Vec<&Vec<f64>> = found
             .iter()
@@ -249,7 +251,7 @@ impl Groups {
         let [rows, columns] = crossed.map(values);
         // Axes that advance together have too few pairs for rows and columns.
         if rows.len() < 2 || columns.len() < 2 || found_here.len() < rows.len() + columns.len() {
-            return;
+            return false;
         }
         let some = |values: &[f64], most: usize| -> Vec<f64> {
             chosen(values.len(), most).into_iter().map(|place| values[place]).collect()
@@ -268,11 +270,10 @@ impl Groups {
         };
         self.shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
         let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.text_of(value)).collect();
-        let held = varying.iter().filter(|axis| is_held(axis));
-        self.held = held.filter_map(|&place| Some(axis(place)?.text_of(found[0][place]))).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
         self.places = places_of(&self.shown);
         self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
+        true
     }
 
     /// The group with these values of the axes, if it is shown.
@@ -280,17 +281,6 @@ impl Groups {
         let mut values = values.to_vec();
         self.makes.merge(&self.axes, &mut values);
         self.places.get(&bits(&values)).copied()
-    }
-
-    /// Drops groups whose items are not kept, and returns a note on them.
-    pub fn retain<T>(&mut self, items: &mut Vec<T>, is_kept: impl Fn(&T) -> bool) -> Option<String> {
-        let pairs = std::mem::take(&mut self.shown).into_iter().zip(std::mem::take(items));
-        let (kept, dropped): (Vec<_>, Vec<_>) = pairs.partition(|(_, item)| is_kept(item));
-        (self.shown, *items) = kept.into_iter().unzip();
-        self.all -= dropped.len();
-        self.places = places_of(&self.shown);
-        let names: Vec<String> = dropped.into_iter().map(|(group, _)| group.name).collect();
-        (!names.is_empty()).then(|| format!("No value for {}.", names.join("; ")))
     }
 
     /// A figure without panels, to which each group adds one; `aspect` applies to a single panel.
@@ -306,7 +296,12 @@ impl Groups {
             rows,
             aspect: if self.shown.len() > 1 { 0.9 } else { aspect },
             subtitle: self.held.join(", "),
-            remarks: self.note().into_iter().collect(),
+            remarks: self
+                .omitted(str::to_owned)
+                .map(|omitted| format!("{omitted}; choose others with --where"))
+                .into_iter()
+                .collect(),
+            notes: self.notes(),
             ..Figure::default()
         }
     }
@@ -319,13 +314,20 @@ impl Groups {
         }
     }
 
-    /// A note about omitted panels.
-    pub fn note(&self) -> Option<String> {
+    /// The number of shown panels or lines, if some are omitted.
+    fn omitted(&self, name: impl Fn(&str) -> String) -> Option<String> {
         (self.left_out > 0).then(|| {
             let what = if self.makes == GroupRole::Panels { "panels" } else { "lines" };
-            let (shown, all) = (self.all - self.left_out, self.all);
-            format!("{shown} of {all} {what} ({}); choose others with --where", self.axes.join(", "))
+            let names: Vec<String> = self.distinguishing.iter().map(|column| name(column)).collect();
+            format!("{} of {} {what} ({})", self.with_value - self.left_out, self.with_value, names.join(", "))
         })
+    }
+
+    /// Notes about omitted groups, in markup.
+    fn notes(&self) -> Vec<String> {
+        let omitted = self.omitted(label::name).map(|omitted| format!("{omitted} are shown."));
+        let empty = (!self.empty.is_empty()).then(|| format!("No value for {}.", label::few(&self.empty)));
+        omitted.into_iter().chain(empty).collect()
     }
 }
 
@@ -341,26 +343,69 @@ impl GroupRole {
     }
 }
 
-/// The distinct values of `axes` in ascending order; more than `MAX_GROUPS` if there are too many.
-fn keys(filtered: &FilteredTable, axes: &[&str], makes: GroupRole) -> Result<Vec<Vec<f64>>, PlotError> {
-    let mut found: HashMap<Vec<u64>, Vec<f64>> = HashMap::new();
+/// The groups of the rows over `axes`: in the order of their first rows if each has a label, else ascending. More than `MAX_GROUPS` if there are too
+/// many. Their values are those of the second columns `drawn` over the first ones, which are axes; without columns, each group has a value.
+fn find(
+    filtered: &FilteredTable,
+    axes: &[&str],
+    makes: GroupRole,
+    drawn: [&[&str]; 2],
+) -> Result<Vec<FoundGroup>, PlotError> {
+    if axes.is_empty() {
+        return Ok(vec![FoundGroup { values: Vec::new(), label: String::new(), has_value: true }]);
+    }
+    let labels = filtered.label_columns();
+    let columns = [axes, &labels, drawn[0], drawn[1]].concat();
+    let mut found: IndexMap<Vec<u64>, (FoundGroup, Vec<u64>)> = IndexMap::new();
+    // The axes and labels of the last row, if its group has a value.
     let mut last: Vec<f64> = Vec::new();
-    filtered.each_while(axes, |cells| {
-        if !last.is_empty() && last.iter().zip(cells).all(|(last, cell)| last.to_bits() == cell.to_bits()) {
+    filtered.each_while(&columns, |row| {
+        let (key, cells) = row.split_at(axes.len() + labels.len());
+        if !last.is_empty() && last.iter().zip(key).all(|(last, cell)| last.to_bits() == cell.to_bits()) {
             return true;
         }
+        let (values, label) = key.split_at(axes.len());
+        let (at, cells) = cells.split_at(drawn[0].len());
+        let mut values = values.to_vec();
+        makes.merge(axes, &mut values);
+        let new = |values: Vec<f64>| FoundGroup { values, label: filtered.label(label), has_value: false };
+        let (group, known) = found.entry(bits(&values)).or_insert_with(|| (new(values), bits(label)));
+        if *known != bits(label) {
+            group.label.clear();
+        }
+        let is_value = at.iter().all(|at| at.is_finite()) && cells.iter().any(|cell| !cell.is_nan());
+        group.has_value |= drawn[1].is_empty() || is_value;
         last.clear();
-        last.extend_from_slice(cells);
-        let mut cells = cells.to_vec();
-        makes.merge(axes, &mut cells);
-        found.entry(bits(&cells)).or_insert(cells);
-        // Without axes there is one group.
-        !axes.is_empty() && found.len() <= MAX_GROUPS
+        last.extend(key.iter().filter(|_| group.has_value));
+        found.len() <= MAX_GROUPS
     })?;
-    let mut found: Vec<Vec<f64>> = found.into_values().collect();
-    let in_order = |(a, b): (&f64, &f64)| a.total_cmp(b);
-    found.sort_by(|a, b| a.iter().zip(b).map(in_order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal));
+    let mut found: Vec<FoundGroup> = found.into_values().map(|(group, _)| group).collect();
+    if found.iter().any(|group| group.label.is_empty()) {
+        found.iter_mut().for_each(|group| group.label.clear());
+        let in_order = |(a, b): (&f64, &f64)| a.total_cmp(b);
+        let order = |a: &FoundGroup, b: &FoundGroup| {
+            a.values.iter().zip(&b.values).map(in_order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+        };
+        found.sort_by(order);
+    }
     Ok(found)
+}
+
+fn values_of(found: &[FoundGroup]) -> Vec<Vec<f64>> {
+    found.iter().map(|group| group.values.clone()).collect()
+}
+
+/// The values of labelled groups with the axes numbered `of_points`, which advance together, as one: the first of them has the number of the label.
+fn joined(found: &[FoundGroup], of_points: &[usize]) -> Vec<Vec<f64>> {
+    let mut labels: IndexSet<&str> = IndexSet::new();
+    let mut joined = values_of(found);
+    for (group, values) in found.iter().zip(&mut joined) {
+        let number = labels.insert_full(&group.label).0;
+        for (place, &axis) in of_points.iter().enumerate() {
+            values[axis] = if place == 0 { number as f64 } else { 0.0 };
+        }
+    }
+    joined
 }
 
 /// The values of the axes numbered `of` in markup, without missing ones.

@@ -16,7 +16,7 @@ const MAX_POSITIONS: usize = 4096;
 pub const MAX_NAMED_ROWS: u64 = 60;
 
 /// Range of a column, relative to its greatest value, below which it is constant. Chosen: the range is rounding.
-const CONSTANT_RTOL: f64 = 1e-9;
+pub const CONSTANT_RTOL: f64 = 1e-9;
 
 /// Ratio of height to width of a single panel, and of several above each other. Chosen: curves rise by about 45 degrees, and all panels fit on a
 /// page.
@@ -60,8 +60,9 @@ struct Rows {
     along: Option<String>,
 }
 
-/// The rows of a group.
+/// The rows of a group: a position for each cell of the axis or, if rows are scattered, for each row.
 struct Line {
+    positions: Vec<f64>,
     /// For each panel, the least and the greatest value of each position.
     ranges: Vec<Vec<(f64, f64)>>,
     /// The name of each position; empty if rows have no names.
@@ -85,8 +86,6 @@ struct Graph {
 /// No row with a value, or a part that cannot be read.
 pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure, PlotError> {
     let mut rows = Rows::read(filtered, plan)?;
-    let no_value =
-        rows.groups.retain(&mut rows.lines, |line| line.ranges.iter().flatten().any(|(low, _)| !low.is_nan()));
     let x = rows.cells.ends().with_room(MARK_ROOM[0]);
     let graphs = (0..plan.y.len()).filter_map(|panel| rows.graph(filtered, plan, panel, x));
     // A constant column is stated instead of drawn, unless all columns are constant.
@@ -102,7 +101,7 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     if drawn.iter().any(|graph| graph.is_cut) {
         notes.push("Zeros, and rounding errors in their place, are below the logarithmic axes.".to_owned());
     }
-    notes.extend(rows.along.take().into_iter().chain(no_value));
+    notes.extend(rows.along.take());
     if rows.has_ranges() {
         let (count, name) = (rows.cells.len(), label::name(&plan.x));
         notes.push(match rows.cells.exact {
@@ -116,23 +115,13 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     if (0..plan.y.len()).any(leaves_out) {
         notes.push("Gaps below zero are not drawn.".to_owned());
     }
-    let figure = Figure {
-        columns: 1,
-        aspect: ASPECTS[usize::from(plan.y.len() > 1)],
-        subtitle: rows
-            .groups
-            .held
-            .iter()
-            .cloned()
-            .chain(stated.iter().filter_map(Graph::equation))
-            .collect::<Vec<_>>()
-            .join(", "),
-        legend: rows.legend(&drawn, &leaders),
-        remarks: rows.groups.note().into_iter().collect(),
-        notes,
-        panels: drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect(),
-        ..Figure::default()
-    };
+    let mut figure = Figure { columns: 1, ..rows.groups.figure(0.0) };
+    figure.aspect = ASPECTS[usize::from(plan.y.len() > 1)];
+    let words = rows.groups.held.iter().cloned().chain(stated.iter().filter_map(Graph::equation));
+    figure.subtitle = words.collect::<Vec<_>>().join(", ");
+    figure.legend = rows.legend(&drawn, &leaders);
+    figure.notes.extend(notes);
+    figure.panels = drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect();
     Ok(LineFigure { figure, groups: rows.groups, leaders, x })
 }
 
@@ -150,24 +139,28 @@ impl Rows {
         let are_scattered = groups::is_scattered(filtered, &plan.x, &further)?;
         further.sort_by_key(|name| Some(*name) != plan.series.as_deref());
         let first = further.first().copied().filter(|name| Some(*name) == plan.series.as_deref());
-        let groups = Groups::new(filtered, &further, GroupRole::Lines, first)?;
+        let drawn: Vec<&str> = plan.y.iter().map(String::as_str).collect();
+        let groups = Groups::new(filtered, &further, GroupRole::Lines, first, [&[&plan.x], &drawn])?;
         let is_named = are_scattered && filtered.rows <= MAX_NAMED_ROWS;
         let labels = if is_named { filtered.label_columns() } else { Vec::new() };
         let cells = AxisCells::new(axis, MAX_POSITIONS);
-        let line = |_| Line {
-            ranges: vec![vec![(f64::NAN, f64::NAN); cells.len()]; plan.y.len()],
-            names: vec![String::new(); if is_named { cells.len() } else { 0 }],
-        };
+        let has_row_each = are_scattered && filtered.rows <= MAX_POSITIONS as u64;
+        let positions = if has_row_each { Vec::new() } else { cells.middles.clone() };
+        let ranges = vec![vec![(f64::NAN, f64::NAN); positions.len()]; plan.y.len()];
+        let line = |_| Line { positions: positions.clone(), ranges: ranges.clone(), names: Vec::new() };
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
         let columns = [&plan.x].into_iter().chain(&plan.y).chain(&groups.axes).map(String::as_str);
         let columns: Vec<&str> = columns.chain(labels).collect();
         filtered.each(&columns, |row| {
             let (values, rest) = row[1..].split_at(plan.y.len());
             let (group, labels) = rest.split_at(groups.axes.len());
-            let (Some(group), Some(place)) = (groups.place(group), cells.place(row[0])) else { return };
+            let (Some(group), Some(mut place)) = (groups.place(group), cells.place(row[0])) else { return };
             let line = &mut lines[group];
-            if let Some(name) = line.names.get_mut(place) {
-                *name = filtered.label(labels);
+            if has_row_each {
+                place = line.positions.len();
+                line.positions.push(row[0]);
+                line.ranges.iter_mut().for_each(|ranges| ranges.push((f64::NAN, f64::NAN)));
+                line.names.extend(is_named.then(|| filtered.label(labels)));
             }
             for (ranges, &value) in line.ranges.iter_mut().zip(values) {
                 let (low, high) = ranges[place];
@@ -196,21 +189,10 @@ impl Rows {
         let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(MARK_ROOM[1])));
         Some(Graph {
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
-            curves: self.lines.iter().map(|line| self.curve(&line.ranges[panel])).collect(),
+            curves: self.lines.iter().map(|line| line.curve(panel)).collect(),
             constant: constant(self.values(panel)),
             is_cut: !is_log && scale.log && self.values(panel).any(|value| value < scale.low),
         })
-    }
-
-    /// The points of a curve; where positions have several values, the least ones and then, after a gap, the greatest.
-    fn curve(&self, ranges: &[(f64, f64)]) -> Vec<(f64, f64)> {
-        let places = || self.cells.middles.iter().copied().zip(ranges);
-        let mut points: Vec<(f64, f64)> = places().map(|(middle, (low, _))| (middle, *low)).collect();
-        if ranges.iter().any(|(low, high)| high > low) {
-            points.push((f64::NAN, f64::NAN));
-            points.extend(places().map(|(middle, (_, high))| (middle, *high)));
-        }
-        points
     }
 
     /// Whether some position has several values.
@@ -243,10 +225,8 @@ impl Rows {
             if !self.are_scattered {
                 panel.layers.push(Layer::Line(points.clone(), colour::series(series)));
             }
-            let named = points.iter().filter_map(|&(x, y)| {
-                let name = self.lines[series].names.get(self.cells.place(x)?)?.clone();
-                (y.is_finite() && !name.is_empty()).then_some(((x, y), name))
-            });
+            let named = points.iter().copied().zip(self.lines[series].names.iter().cloned());
+            let named = named.filter(|((_, y), name)| y.is_finite() && !name.is_empty());
             panel.layers.push(Layer::Names(named.collect()));
             if self.is_marked(&points) {
                 panel.layers.push(Layer::marks(points, series));
@@ -261,6 +241,20 @@ impl Rows {
             true => Key::Mark(Symbol::of_series(series)),
             false => Key::series(series, graphs.iter().any(|graph| self.is_marked(&graph.curves[series]))),
         })
+    }
+}
+
+impl Line {
+    /// The points of a curve; where positions have several values, the least ones and then, after a gap, the greatest.
+    fn curve(&self, panel: usize) -> Vec<(f64, f64)> {
+        let ranges = &self.ranges[panel];
+        let places = || self.positions.iter().copied().zip(ranges);
+        let mut points: Vec<(f64, f64)> = places().map(|(position, (low, _))| (position, *low)).collect();
+        if ranges.iter().any(|(low, high)| high > low) {
+            points.push((f64::NAN, f64::NAN));
+            points.extend(places().map(|(position, (_, high))| (position, *high)));
+        }
+        points
     }
 }
 

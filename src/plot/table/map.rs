@@ -3,11 +3,13 @@
 use super::cells::AxisCells;
 use super::filtered::{FilteredTable, Values};
 use super::groups::Groups;
-use super::lines::MAX_NAMED_ROWS;
+use super::lines::{CONSTANT_RTOL, MAX_NAMED_ROWS};
+use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
+use crate::plot::contour::contour;
 use crate::plot::export::image;
 use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Panel};
-use crate::plot::scale::Scale;
+use crate::plot::scale::{Scale, range};
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
@@ -57,6 +59,8 @@ pub struct MapFigure {
     pub least: Vec<Option<(f64, f64)>>,
     /// The cells of both axes.
     pub cells: [AxisCells; 2],
+    /// For each panel, the values of its cells, row after row from the least `y`, if they may have both signs.
+    values: Vec<Vec<f64>>,
 }
 
 /// The cells of one panel.
@@ -91,13 +95,9 @@ struct Shading<'a> {
 ///
 /// No row with a value, or a part that cannot be read.
 pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, PlotError> {
-    let (mut groups, along) = Groups::of_panels(filtered, &[&plan.x, &plan.y])?;
+    let (groups, along) = Groups::of_panels(filtered, &[&plan.x, &plan.y], &[&plan.value])?;
     let raster = Raster::new(filtered, plan, &groups)?;
-    let mut sheets = raster.read(filtered, plan, &groups)?;
-    // A group without values makes no panel.
-    let has_value = |sheet: &PanelCells| sheet.value.iter().any(|value| !value.is_nan());
-    let is_full = groups.crossed.is_some() || !sheets.iter().any(has_value);
-    let no_value = groups.retain(&mut sheets, |sheet| is_full || has_value(sheet));
+    let sheets = raster.read(filtered, plan, &groups)?;
     let shading = Shading::new(filtered, &plan.value, &sheets)?;
     let mut figure = groups.figure(0.8);
     let axis = |name: &str, cells: &AxisCells| Axis::new(name, &filtered.unit(name), cells.scale);
@@ -120,9 +120,35 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
     let unbounded = |name: &&String| filtered.axis(name).is_some_and(|axis| axis.infinite);
     let unbounded = [&plan.x, &plan.y].into_iter().find(unbounded);
     let unbounded = unbounded.map(|name| format!("Rows with {} = ∞ have no place in the map.", label::name(name)));
-    figure.notes.extend(along.into_iter().chain(no_value).chain(unbounded).chain(raster.note(plan)).chain(rounding));
+    figure.notes.extend(along.into_iter().chain(unbounded).chain(raster.note(plan)).chain(rounding));
     let least = sheets.iter().map(|sheet| sheet.least.map(|(x, y, _)| (x, y))).collect();
-    Ok(MapFigure { figure, groups, least, cells: raster.cells })
+    let is_signed = figure.colours.is_some() && plan.value != "gap" && !raster.are_dots;
+    let values = sheets.into_iter().filter(|_| is_signed).map(|sheet| sheet.value).collect();
+    Ok(MapFigure { figure, groups, least, cells: raster.cells, values })
+}
+
+impl MapFigure {
+    /// Draws the lines on which `column` is 0, if it has both signs.
+    pub fn zero_line(&mut self, column: &str) {
+        let (low, high) = range(self.values.iter().flatten().copied());
+        let rounding = CONSTANT_RTOL * low.abs().max(high.abs());
+        let [x, y] = &self.cells;
+        if low >= -rounding || high <= rounding || x.len() < 2 || y.len() < 2 {
+            return;
+        }
+        let stroke = Stroke::solid("#000", 0.9);
+        let mut is_drawn = false;
+        for (panel, values) in self.figure.panels.iter_mut().zip(&self.values) {
+            let clean = |value: &f64| if value.abs() < rounding { 0.0 } else { *value };
+            let lines = contour(&values.iter().map(clean).collect::<Vec<_>>(), x.len());
+            let at = |(column, row)| (x.value_at(column), y.value_at(row));
+            let lines: Vec<Vec<_>> = lines.into_iter().map(|line| line.into_iter().map(at).collect()).collect();
+            is_drawn |= !lines.is_empty();
+            panel.layers.push(Layer::Contour(lines, stroke));
+        }
+        let text = format!("{} = 0", label::name(column));
+        self.figure.legend.extend(is_drawn.then_some(Entry { key: Key::Contour(stroke), text }));
+    }
 }
 
 impl Raster {

@@ -214,6 +214,13 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     TablePicture { table: "gap_histogram", title: "Cubic shortcuts by their work gap", ..OWN_DRAWING },
 ];
 
+impl TablePicture {
+    /// A column of lines, for messages.
+    fn line(&self, filtered: &FilteredTable) -> String {
+        self.lines.iter().find(|column| filtered.has(column)).map_or("COLUMN", |column| column).to_owned()
+    }
+}
+
 impl Source {
     /// The dataset in `folder`, whose values are in `units`.
     pub fn new(folder: Folder, manifest: Manifest, units: Units) -> Source {
@@ -291,9 +298,9 @@ fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<(&'static
     Ok((!both_finite).then_some(if draws_v { (v, tau) } else { (tau, v) }))
 }
 
-/// The values common to all rows.
+/// The labels and values common to all rows.
 fn fixed(filtered: &FilteredTable, drawn: &[String]) -> String {
-    let mut words = Vec::new();
+    let mut words: Vec<String> = filtered.common_labels.iter().map(|(_, word)| label::literal(word)).collect();
     for axis in filtered.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
         match axis.values.as_slice() {
             [one] if !axis.infinite => words.push(axis.text_of(*one)),

@@ -26,6 +26,8 @@ struct Overlay {
     along: &'static [&'static str],
     other: &'static str,
     curves: &'static [Curve],
+    /// The column that is 0 on the curves; none if empty.
+    is_zero_of: &'static str,
     /// Steps along a curve. Chosen: no corner is visible in print.
     steps: usize,
     /// The values of the curves at a point, in scaled units.
@@ -52,6 +54,7 @@ const OVERLAYS: [Overlay; 5] = [
         along: &["v_f", "m", "b", "a"],
         other: "k",
         curves: &[Curve("k_c_f", "", 1.0, &[4.0, 2.0])],
+        is_zero_of: "growth_rate",
         steps: 400,
         of: |point| vec![point.critical_stiffness()],
     },
@@ -61,6 +64,7 @@ const OVERLAYS: [Overlay; 5] = [
         along: &["a", "b", "v_i", "v_f"],
         other: "t_f",
         curves: &[Curve("t_cross", "", 0.9, &[]), Curve("t_floor", "", 0.9, DASHES)],
+        is_zero_of: "",
         steps: 120,
         of: |point| {
             let times = point.times(Wanted { cross: true, floor: true, ..NO_TIME });
@@ -73,6 +77,7 @@ const OVERLAYS: [Overlay; 5] = [
         along: &["t_f"],
         other: "v_ceiling",
         curves: &[Curve("v_ceiling_least", "", 0.9, DASHES), Curve("v_max", " without ceiling", 0.9, &[])],
+        is_zero_of: "",
         steps: 120,
         of: |point| point.ceilings("v_ceiling"),
     },
@@ -82,6 +87,7 @@ const OVERLAYS: [Overlay; 5] = [
         along: &["t_f"],
         other: "tau_ceiling",
         curves: &[Curve("tau_ceiling_least", "", 0.9, DASHES), Curve("friction_max", " without ceiling", 0.9, &[])],
+        is_zero_of: "",
         steps: 120,
         of: |point| point.ceilings("tau_ceiling"),
     },
@@ -96,6 +102,7 @@ const OVERLAYS: [Overlay; 5] = [
             Curve("t_floor", "", 0.9, DASHES),
             Curve("t_min", "", 0.9, &[1.0, 1.5]),
         ],
+        is_zero_of: "",
         steps: 240,
         of: |point| {
             let times = point.times(Wanted { cross: true, floor: true, min: true, ..NO_TIME });
@@ -107,8 +114,10 @@ const OVERLAYS: [Overlay; 5] = [
 /// No duration.
 const NO_TIME: Wanted = Wanted { cross: false, floor: false, cheapest: false, min: false, turn: false, free: false };
 
-/// Draws the curves that belong on a map. A curve that leaves a panel everywhere is not drawn there.
+/// Draws the curves that belong on a map, and the lines on which its column is 0 if none of the curves is such a line. A curve that leaves a panel
+/// everywhere is not drawn there.
 pub fn curves(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigure) {
+    let mut has_zero_line = false;
     let table = scene.filtered.table.as_str();
     let known = OVERLAYS.iter().filter(|overlay| overlay.tables.contains(&table) && scene.source.has_overlays);
     for overlay in known {
@@ -118,8 +127,12 @@ pub fn curves(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigur
             _ => continue,
         };
         if ["", plan.value.as_str()].contains(&overlay.value) {
-            overlay.draw(scene, map, (along, if along == 0 { &plan.x } else { &plan.y }));
+            overlay.draw(scene, map, (along, if along == 0 { &plan.x } else { &plan.y }), &plan.value);
+            has_zero_line |= overlay.is_zero_of == plan.value;
         }
+    }
+    if !has_zero_line {
+        map.zero_line(&plan.value);
     }
 }
 
@@ -129,7 +142,7 @@ impl Overlay {
         self.tables.contains(&"optimal")
     }
 
-    fn draw(&self, scene: &TableScene<'_>, map: &mut MapFigure, (along, axis): (usize, &str)) {
+    fn draw(&self, scene: &TableScene<'_>, map: &mut MapFigure, (along, axis): (usize, &str), value: &str) {
         let mut is_drawn = vec![false; self.curves.len()];
         let (unit, unit_of_other) = (scene.size(axis), scene.size(self.other));
         for (group, panel) in map.figure.panels.iter_mut().enumerate() {
@@ -162,7 +175,8 @@ impl Overlay {
         let is_free = !CEILINGS.contains(&self.other) && CEILINGS.into_iter().any(has_ceilings);
         for (curve, _) in self.curves.iter().zip(is_drawn).filter(|(_, is_drawn)| *is_drawn) {
             let condition = if is_free { " without ceilings" } else { curve.1 };
-            let text = format!("{}{condition}", label::name(curve.0));
+            let zero = if self.is_zero_of == value { format!(": {} = 0", label::name(value)) } else { String::new() };
+            let text = format!("{}{condition}{zero}", label::name(curve.0));
             map.figure.legend.push(Entry { key: Key::Contour(curve.stroke()), text });
         }
     }

@@ -47,7 +47,7 @@ fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
 /// Histogram: numbers of shortcuts by decade of the gap.
 pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(filtered);
-    let (groups, along) = Groups::of_panels(filtered, &[])?;
+    let (groups, along) = Groups::of_panels(filtered, &[], &[])?;
     let wanted: Vec<&str> = columns.iter().copied().chain(groups.axes.iter().map(String::as_str)).collect();
     let mut counts = vec![vec![0.0; columns.len()]; groups.shown.len()];
     filtered.each(&wanted, |row| {
@@ -120,7 +120,7 @@ struct Quantiles<'a> {
 }
 
 fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
-    let (groups, along) = Groups::of_panels(filtered, &[across])?;
+    let (groups, along) = Groups::of_panels(filtered, &[across], &[])?;
     let cells = AxisCells::new(filtered.axis(across).ok_or(PlotError::Nothing)?, MAX_POSITIONS);
     let empty = |_| Quantiles { cells: &cells, columns, values: vec![vec![f64::NAN; cells.len()]; columns.len()] };
     let mut quantiles: Vec<Quantiles> = groups.shown.iter().map(empty).collect();
