@@ -181,13 +181,12 @@ fn predicted(name: &str, statistics: &TableStatistics) -> Vec<SummaryBlock> {
         SummaryBlock::Line(2, format!("{} as {} predicts it, and as found:", prediction.column, prediction.theory)),
         SummaryBlock::Table(4, names.to_vec(), Vec::new(), statistics.predicted.iter().map(line).collect()),
     ];
-    let is_surprise = |(predicted, found, _): &&(String, String, u64)| {
-        found == prediction.surprise && predicted != prediction.surprise
-    };
-    let differ: u64 = statistics.predicted.iter().filter(is_surprise).map(|(.., rows)| rows).sum();
-    if differ > 0 {
-        let rows = words::things(differ, "row");
-        blocks.push(SummaryBlock::Line(4, format!("{rows} of {}: {}", prediction.surprise, prediction.why)));
+    for (word, why) in prediction.surprises {
+        let differ = statistics.predicted.iter().filter(|(predicted, found, _)| found == word && predicted != word);
+        let differ: u64 = differ.map(|(.., rows)| rows).sum();
+        if differ > 0 {
+            blocks.push(SummaryBlock::Line(4, format!("{} of {word}: {why}", words::things(differ, "row"))));
+        }
     }
     blocks
 }

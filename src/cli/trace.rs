@@ -354,7 +354,13 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
     let (mut path, trace, effects) = arguments.traced(&request)?;
     let least = trace.moments.iter().map(|moment| moment.friction).fold(f64::INFINITY, f64::min);
     path.status = path.status.with_friction(least);
-    let trace = trace.in_units(&request.units);
+    let mut trace = trace.in_units(&request.units);
+    // A given duration keeps its digits, which the conversion to and from SI rounds.
+    let is_duration = |number: &&Named| number.name == Quantity::Time.name() && request.units != Units::Scaled;
+    let given = request.numbers.iter().find(is_duration);
+    if let (Some(t_f), Some(last)) = (given.map(|number| number.value), trace.moments.last().map(|moment| moment.t)) {
+        trace.moments.iter_mut().for_each(|moment| moment.t = t_f * (moment.t / last));
+    }
     let mut header = header(arguments, &request, &path, &trace);
     let mut facts = facts(arguments, &request, &path, &trace);
     if let Some(effects) = effects {
@@ -803,6 +809,9 @@ fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 
     [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
 }
 
+/// Fraction of the greatest velocity that equally spaced rows show. Chosen: less is visible in a picture.
+const SHOWN_PEAK: f64 = 0.99;
+
 /// The description of the protocol, in a few lines.
 fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> String {
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
@@ -830,7 +839,14 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     ));
     let rows = words::things(trace.moments.len() as u64, "row");
     match arguments.points {
-        Some(_) => text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n")),
+        Some(_) => {
+            text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n"));
+            let fastest = trace.moments.iter().map(|moment| moment.v).fold(0.0, f64::max);
+            if fastest < SHOWN_PEAK * trace.v_max {
+                let fastest = words::number(fastest);
+                text.push_str(&format!("  these times miss v_max; the greatest v in the rows is {fastest}\n"));
+            }
+        }
         None => {
             let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
             let lines = format!("linear interpolation errs by up to {range} of the range of a column");

@@ -624,22 +624,22 @@ impl PolarsDialect {
     }
 }
 
-/// Groups by the new name of a column of a joined table, such as `best` of `c.gap AS best`: polars does not find `c.gap` beside an aggregate of another
-/// column `gap`.
-fn name_keys(select: &mut Select) {
-    let GroupByExpr::Expressions(keys, _) = &mut select.group_by else { return };
-    for key in keys {
-        let Expr::CompoundIdentifier(names) = &*key else { continue };
-        let Some(column) = names.last().cloned() else { continue };
-        let is_renamed = |item: &&mut SelectItem| matches!(item, SelectItem::ExprWithAlias { expr, .. } if expr == key);
-        let Some(item) = select.projection.iter_mut().find(is_renamed) else { continue };
-        match item {
-            SelectItem::ExprWithAlias { alias, .. } if alias.value != column.value => {
-                *key = Expr::Identifier(alias.clone());
-            }
-            _ => *item = SelectItem::UnnamedExpr(key.clone()),
+/// The keys of GROUP BY that are columns of joined tables with new names, such as `least` in `c.gap AS least`: polars does not find `c.gap` beside an
+/// aggregate of another column `gap`.
+fn renamed_keys(select: &Select) -> Vec<(Expr, Ident)> {
+    let GroupByExpr::Expressions(keys, _) = &select.group_by else { return Vec::new() };
+    let renamed = |item: &SelectItem| match item {
+        SelectItem::ExprWithAlias { expr: expr @ Expr::CompoundIdentifier(_), alias } if keys.contains(expr) => {
+            Some((expr.clone(), alias.clone()))
         }
-    }
+        _ => None,
+    };
+    select.projection.iter().filter_map(renamed).collect()
+}
+
+/// Whether a name is that of the column itself.
+fn is_own_name(column: &Expr, name: &Ident) -> bool {
+    matches!(column, Expr::CompoundIdentifier(names) if names.last().is_some_and(|last| last.value == name.value))
 }
 
 /// `expression` as `data_type`.
@@ -650,13 +650,38 @@ pub fn cast(expression: Expr, data_type: DataType) -> Expr {
 impl VisitorMut for PolarsDialect {
     type Break = ();
 
+    fn pre_visit_query(&mut self, query: &mut Query) -> ControlFlow<()> {
+        let SetExpr::Select(select) = query.body.as_ref() else { return ControlFlow::Continue(()) };
+        let renamed = renamed_keys(select);
+        if let Some(OrderByKind::Expressions(keys)) = query.order_by.as_mut().map(|order| &mut order.kind) {
+            for key in keys {
+                if let Some((_, name)) = renamed.iter().find(|(known, _)| *known == key.expr) {
+                    key.expr = Expr::Identifier(name.clone());
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
     fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {
         for NamedWindowDefinition(_, window) in &mut select.named_window {
             if let NamedWindowExpr::WindowSpec(window) = window {
                 order_nulls(&mut window.order_by);
             }
         }
-        name_keys(select);
+        for (key, name) in renamed_keys(select) {
+            if let (false, GroupByExpr::Expressions(keys, _)) = (is_own_name(&key, &name), &mut select.group_by) {
+                keys.iter_mut()
+                    .filter(|known| **known == key)
+                    .for_each(|known| *known = Expr::Identifier(name.clone()));
+                continue;
+            }
+            for item in &mut select.projection {
+                if matches!(item, SelectItem::ExprWithAlias { expr, .. } if *expr == key) {
+                    *item = SelectItem::UnnamedExpr(key.clone());
+                }
+            }
+        }
         ControlFlow::Continue(())
     }
 

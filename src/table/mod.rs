@@ -111,10 +111,8 @@ pub struct Prediction {
     pub column: &'static str,
     /// The theory, in a few words.
     pub theory: &'static str,
-    /// A word that may occur against the prediction.
-    pub surprise: &'static str,
-    /// The reason.
-    pub why: &'static str,
+    /// Words that may occur against the prediction, each with the reason.
+    pub surprises: &'static [(&'static str, &'static str)],
     /// The axes of the prediction.
     pub axes: &'static [Quantity],
     /// The predicted word at a point.

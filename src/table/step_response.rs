@@ -73,8 +73,16 @@ pub const DEFAULT_RTOL: f64 = 1e-6;
 pub const PREDICTION: Prediction = Prediction {
     column: "outcome",
     theory: "linear stability at v_f (settled above k_c)",
-    surprise: Outcome::NAMES[Outcome::LimitCycle as usize],
-    why: "stable against small disturbances, but the step leads to a limit cycle around steady sliding",
+    surprises: &[
+        (
+            Outcome::NAMES[Outcome::LimitCycle as usize],
+            "stable against small disturbances, but the step leads to a limit cycle around steady sliding",
+        ),
+        (
+            Outcome::NAMES[Outcome::Diverged as usize],
+            "without mass the velocity becomes infinite; with any mass, on the axis m, it does not",
+        ),
+    ],
     axes: &[A, B, FinalVelocity, Stiffness, Mass],
     word: |point| {
         let sliding = SteadySliding::new(transition(point).law, point[Stiffness], point[Mass], point[FinalVelocity]);

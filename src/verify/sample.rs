@@ -50,7 +50,8 @@ pub fn rows(folder: &Folder, manifest: &Manifest, table: &ManifestTable, count: 
         let damaged = |why| State::Damaged { why };
         let read = match folder.state(manifest, &table.name, part, CheckDepth::Footer) {
             // The numbers of an edited part are compared, too.
-            State::There { .. } | State::Damaged { .. } | State::Foreign { what: PROGRAM, .. } => {
+            State::Damaged { why } => frame::read_all(&path).map_err(|_| damaged(why)),
+            State::There { .. } | State::Foreign { what: PROGRAM, .. } => {
                 frame::read_all(&path).map_err(|error| damaged(error.reason))
             }
             State::Missing => {

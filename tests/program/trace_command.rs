@@ -447,7 +447,10 @@ fn a_row_without_a_path_states_why() {
         (&[], "error: results/rows: a dataset without a table\n"),
         (&["optimal"], "error: results/rows: which row of `optimal`?\n  expected: --row N, from 0 to 3, or --where"),
         (&["optimal", "--row", "4"], "error: results/rows: no row 4 in `optimal`\n  expected: a row from 0 to 3\n"),
-        (&["optimal", "--row", "1"], "error: results/rows: row 1 of `optimal`: t_f = 0.02"),
+        (
+            &["optimal", "--row", "1"],
+            "error: results/rows: row 1 of `optimal`: t_f = 20 s is too short for v >= v_0: the least is ",
+        ),
         (
             &["optimal", "--where", "t_f>0"],
             "error: results/rows: several rows of `optimal` meet --where \"t_f>0\"\n  found: rows 0, 1, 2, 3\n",
