@@ -1,13 +1,14 @@
 //! `slipsweep plot DATASET|TRACE…`: pictures as SVG, PNG or PDF.
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::waiting;
 use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, refused, say, write_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
-use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError};
+use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError, missing_letters};
 use crate::sweep::units_of;
 
 /// Arguments of `plot`.
@@ -17,7 +18,8 @@ use crate::sweep::units_of;
   slipsweep plot results/landscape --format png --out pictures
   slipsweep plot results/landscape --table gap --where t_f=0.02 --out gap.pdf
   slipsweep plot results/crossover --table crossover --x v_f --y b --color t_floor --where v_i=1.1
-  slipsweep plot optimal.csv best_cubic.csv --out protocols.png")]
+  slipsweep plot optimal.csv best_cubic.csv --out protocols.png
+  slipsweep plot cycle.csv --x v --y tau                 a phase portrait")]
 pub struct Arguments {
     /// Folder of a dataset, such as results/NAME, or traces of `slipsweep trace` (.csv, .parquet)
     #[arg(required = true, value_name = "DATASET|TRACE")]
@@ -28,10 +30,10 @@ pub struct Arguments {
     /// Rows to show, such as "a=0.03, v_f>=10"
     #[arg(long = "where", value_name = "CONDITION")]
     conditions: Vec<String>,
-    /// Horizontal axis
+    /// Horizontal axis; for traces a column, such as v [default for traces: t]
     #[arg(long, value_name = "AXIS")]
     x: Option<String>,
-    /// Vertical axis of a map, or the column of lines
+    /// Vertical axis of a map, or the column of lines or traces
     #[arg(long, value_name = "AXIS|COLUMN")]
     y: Option<String>,
     /// Colour column of a map, or the axis that distinguishes lines
@@ -97,7 +99,12 @@ struct OutputTarget {
 impl Arguments {
     fn traces(&self, sources: &[PathBuf], place: &OutputTarget) -> Result<(), Failure> {
         let courses = sources.iter().map(|path| plot::trace::read(path)).collect::<Result<Vec<_>, _>>()?;
-        if let Some(flag) = self.given(("--table", self.table.is_some())) {
+        let of_tables = [
+            ("--table", self.table.is_some()),
+            ("--where", !self.conditions.is_empty()),
+            ("--color", self.color.is_some()),
+        ];
+        if let Some((flag, _)) = of_tables.into_iter().find(|(_, is_given)| *is_given) {
             return Err(wrong(format!(
                 "{flag}: traces have no tables\n  expected: the folder of a dataset, such as results/NAME"
             )));
@@ -106,7 +113,7 @@ impl Arguments {
             [one] => one.file_stem().map_or("trace".into(), |stem| stem.to_string_lossy().into_owned()),
             _ => "traces".to_owned(),
         };
-        let figure = plot::trace::figure(&courses)?;
+        let figure = plot::trace::figure(&courses, [self.x.as_deref(), self.y.as_deref()])?;
         let path = self.write(&figure, &stem, place)?;
         say(&format!("written to {}\n{}", path.display(), remarks(&figure)))
     }
@@ -193,8 +200,14 @@ impl Arguments {
             false => place.path.join(format!("{stem}.{}", place.format.ending())),
         };
         let width = self.width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
-        let encode = || place.format.encode(&figure.draw(width).svg, self.dpi);
-        let bytes = waiting("writing the picture", encode)?;
+        let svg = figure.draw(width).svg;
+        let missing = missing_letters(&svg);
+        if place.format != Format::Svg && !missing.is_empty() {
+            let letters: String = missing.into_iter().collect();
+            // A note that cannot be printed is no failure.
+            let _ = writeln!(io::stderr(), "note: the font of PNG and PDF lacks {letters}; an SVG has all letters");
+        }
+        let bytes = waiting("writing the picture", || place.format.encode(&svg, self.dpi))?;
         if !place.is_file {
             fs::create_dir_all(&place.path).map_err(|error| cannot_write(&path, &error))?;
         }

@@ -467,9 +467,12 @@ impl Arguments {
         };
         let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
-            if request.origin.as_ref().is_some_and(|origin| origin.is_infeasible) {
-                let reason = "its status is infeasible: the optimum that it is compared with does not exist";
-                return Err(wrong(reason));
+            if let Some(Origin { table, row, .. }) = request.origin.as_ref().filter(|origin| origin.is_infeasible) {
+                let reason = match table.as_str() {
+                    "step_response" => "the response diverges: without mass the velocity becomes infinite",
+                    _ => "its status is infeasible: the optimum that it is compared with does not exist",
+                };
+                return Err(wrong(format!("{}: row {row} of `{table}`: {reason}", self.subject)));
             }
             let trace = of(&*path.motion)?;
             return Ok((path, trace, None));

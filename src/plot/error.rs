@@ -55,6 +55,9 @@ pub enum PlotError {
     /// The table has no column of this name.
     #[error("{argument}: the table `{table}` has no {what} `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
     NoColumn { argument: String, table: String, what: &'static str, name: String, found: Vec<String> },
+    /// The trace has no column of this name.
+    #[error("{argument}: the trace has no column `{name}`\n  found: {}\n  help: {}", .found.join(", "), hint(.name, .found))]
+    NoTraceColumn { argument: &'static str, name: String, found: Vec<String> },
     /// A condition that cannot be read.
     #[error(
         "--where {text}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them, or COLUMN in (VALUE, VALUE); several of them separated by commas\n  help: such as --where \"a=0.03, v_f>=10\""

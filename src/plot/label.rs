@@ -3,6 +3,7 @@
 //! `*…*` is italic, `_{…}` below and `^{…}` above the line, as in `*t*_{f} (*l*/*v*_{0})`; `∗` is an asterisk, and all other characters are
 //! literal.
 
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use ttf_parser::Face;
@@ -79,11 +80,21 @@ pub fn width(markup: &str) -> f64 {
     spans(markup).iter().map(span_width).sum()
 }
 
-fn span_width(span: &TextRun) -> f64 {
+/// The fonts, read once.
+fn faces() -> &'static [Option<Face<'static>>; 2] {
     static FACES: OnceLock<[Option<Face<'static>>; 2]> = OnceLock::new();
-    let faces = FACES.get_or_init(|| FONTS.map(|font| Face::parse(font, 0).ok()));
+    FACES.get_or_init(|| FONTS.map(|font| Face::parse(font, 0).ok()))
+}
+
+/// The letters of a text that the fonts lack.
+pub fn missing_letters(text: &str) -> BTreeSet<char> {
+    let is_missing = |letter: &char| faces()[0].as_ref().is_some_and(|face| face.glyph_index(*letter).is_none());
+    text.chars().filter(|letter| !letter.is_ascii()).filter(is_missing).collect()
+}
+
+fn span_width(span: &TextRun) -> f64 {
     let size = if span.level == 0 { 1.0 } else { SCRIPT_SIZE };
-    let Some(face) = &faces[usize::from(span.italic)] else { return 0.6 * size * span.text.len() as f64 };
+    let Some(face) = &faces()[usize::from(span.italic)] else { return 0.6 * size * span.text.len() as f64 };
     let advance = |letter: char| face.glyph_index(letter).and_then(|glyph| face.glyph_hor_advance(glyph));
     let units: u32 =
         span.text.chars().map(|letter| u32::from(advance(letter).unwrap_or(face.units_per_em() / 2))).sum();

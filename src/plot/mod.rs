@@ -19,6 +19,7 @@ pub use colour::series;
 pub use error::PlotError;
 pub use export::Format;
 pub use figure::{Axis, Entry, Figure, Key, Layer, Panel, SvgFigure};
+pub use label::missing_letters;
 pub use page::Page;
 pub use scale::Scale;
 pub use symbol::Symbol;

@@ -1,4 +1,4 @@
-//! Pictures of traces: velocity, state variable and friction over time, for several traces together.
+//! Pictures of traces: velocity, state variable and friction over time, or one column over another, for several traces together.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,8 +18,9 @@ use crate::trace::{self, COLUMNS, Trace};
 /// Greatest number of points of a line; longer lines are thinned. Chosen: four points per dot of a wide picture in print.
 const MAX_POINTS: usize = 8000;
 
-/// Ratio of height to width of a panel. Chosen: three of them make a square.
+/// Ratio of height to width of one of several panels, and of a single one. Chosen: three of them make a square.
 const ASPECT: f64 = 0.42;
+const ASPECT_OF_ONE: f64 = 0.75;
 
 /// The columns of each panel. The velocity of the block and the control velocity are in one panel.
 const PANEL_COLUMNS: [&[&str]; 3] = [&["v", "v_c"], &["theta"], &["tau"]];
@@ -100,10 +101,22 @@ impl TraceFile {
         self.columns.iter().find(|column| column.name == name)
     }
 
-    /// Its points in a panel: a column over the time.
-    fn points(&self, name: &str) -> Option<Vec<(f64, f64)>> {
-        let (t, values) = (self.column("t")?, self.column(name)?);
-        Some(thinned(t.cells.iter().copied().zip(values.cells.iter().copied()).collect()))
+    /// Its points in a panel: the column `name` over `x`.
+    fn points(&self, x: &str, name: &str) -> Option<Vec<(f64, f64)>> {
+        let (x, values) = (self.column(x)?, self.column(name)?);
+        Some(thinned(x.cells.iter().copied().zip(values.cells.iter().copied()).collect()))
+    }
+
+    /// # Errors
+    /// If `argument` requests a column that it does not have.
+    fn check(&self, argument: &'static str, column: Option<&str>) -> Result<(), PlotError> {
+        match column.filter(|name| self.column(name).is_none()) {
+            None => Ok(()),
+            Some(name) => {
+                let found = self.columns.iter().map(|column| column.name.clone()).collect();
+                Err(PlotError::NoTraceColumn { argument, name: name.to_owned(), found })
+            }
+        }
     }
 
     fn is_marked(&self) -> bool {
@@ -175,33 +188,43 @@ struct Curve {
     points: Vec<(f64, f64)>,
 }
 
-/// The figure of traces, with a panel for each group of columns with values.
+/// The figure of traces, with a panel for each group of columns with values, or for the column `y`, over the column `x`, or over time.
 ///
 /// # Errors
 ///
-/// Too many traces, or traces without values.
-pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
+/// Too many traces, a column that one does not have, or traces without values.
+pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure, PlotError> {
     if traces.len() > MAX_SERIES {
         return Err(PlotError::TooManyTraces { found: traces.len(), most: MAX_SERIES });
     }
-    one_unit(traces)?;
-    let time = Scale { log: false, ..Scale::of(cells(traces, "t")).ok_or(PlotError::Nothing)? };
+    traces.iter().try_for_each(|trace| trace.check("--x", x).and_then(|()| trace.check("--y", y)))?;
+    let x = x.unwrap_or("t");
+    if Some(x) == y {
+        return Err(PlotError::SameAxes { axis: x.to_owned() });
+    }
+    let groups: Vec<Vec<&str>> = match y {
+        Some(y) => vec![vec![y]],
+        None => PANEL_COLUMNS.iter().filter(|names| !names.contains(&x)).map(|names| names.to_vec()).collect(),
+    };
+    one_unit(traces, groups.iter().flatten().copied().chain([x]))?;
+    let all = Scale::of(cells(traces, x)).ok_or(PlotError::Nothing)?;
+    let across = Scale { log: all.log && x != "t", ..all };
     let axis = |names: &[&str], scale| Axis::new(&names.join(", "), &unit_in(traces, names[0]), scale);
     let mut panels = Vec::new();
-    for names in PANEL_COLUMNS {
+    for names in groups {
         let has = |name: &&str| traces.iter().any(|trace| trace.column(name).is_some());
         let names: Vec<&str> = names.iter().copied().filter(has).collect();
         let Some(scale) = Scale::of(names.iter().flat_map(|name| cells(traces, name))) else { continue };
-        let (x, y) = (axis(&["t"], time.with_room(0.03)), axis(&names, scale.with_room(0.06)));
+        let (x_axis, y) = (axis(&[x], across.with_room(0.03)), axis(&names, scale.with_room(0.06)));
         let bound = Layer::Level(1.0, Stroke { colour: "#888", width: 0.5, dashes: &[1.0, 1.5] });
         let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
         let layers = has_bound.then_some(bound).into_iter().collect();
         let of_course = |(trace, of): (usize, &TraceFile)| {
-            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(name)));
+            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(x, name)));
             points.filter_map(|(rank, points)| Some(Curve { trace, rank, points: points? })).collect::<Vec<_>>()
         };
         let curves: Vec<Curve> = traces.iter().enumerate().flat_map(of_course).collect();
-        panels.push((Panel { title: String::new(), x, y, layers }, curves));
+        panels.push((Panel { title: String::new(), x: x_axis, y, layers }, curves));
     }
     let leaders = leaders(traces.len(), &panels);
     let common = common(traces);
@@ -210,9 +233,12 @@ pub fn figure(traces: &[TraceFile]) -> Result<Figure, PlotError> {
         _ => "Protocols".to_owned(),
     };
     let subtitle = equations(&common, &unit_in(traces, "t"));
-    let legend = legend(traces, &leaders, &common);
-    let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, traces, &leaders)).collect();
-    Ok(Figure { title, subtitle, panels, columns: 1, aspect: ASPECT, legend, ..Figure::default() })
+    let has_control = panels.iter().any(|(_, curves)| curves.iter().any(|curve| curve.rank > 0));
+    let legend = legend(traces, &leaders, &common, has_control);
+    let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, traces, &leaders));
+    let panels: Vec<Panel> = panels.collect();
+    let aspect = if panels.len() == 1 { ASPECT_OF_ONE } else { ASPECT };
+    Ok(Figure { title, subtitle, panels, columns: 1, aspect, legend, ..Figure::default() })
 }
 
 /// The cells of a column in all traces.
@@ -225,14 +251,14 @@ fn unit_in(traces: &[TraceFile], name: &str) -> String {
     traces.iter().find_map(|trace| Some(trace.column(name)?.unit.clone())).unwrap_or_default()
 }
 
-/// Checks that the traces agree in units.
-fn one_unit(traces: &[TraceFile]) -> Result<(), PlotError> {
-    for name in PANEL_COLUMNS.into_iter().flatten().chain(&["t"]) {
+/// Checks that the traces agree in the units of these columns.
+fn one_unit<'a>(traces: &[TraceFile], names: impl Iterator<Item = &'a str>) -> Result<(), PlotError> {
+    for name in names {
         let first = unit_in(traces, name);
         let mut units = traces.iter().filter_map(|trace| Some(trace.column(name)?.unit.as_str()));
         if let Some(other) = units.find(|unit| *unit != first) {
             let units = [first, other.to_owned()];
-            return Err(PlotError::Units { column: (*name).to_owned(), units });
+            return Err(PlotError::Units { column: name.to_owned(), units });
         }
     }
     Ok(())
@@ -279,8 +305,8 @@ fn equations(parameters: &[&(String, f64)], time: &str) -> String {
     parameters.iter().map(equation).collect::<Vec<_>>().join(", ")
 }
 
-/// The legend: differences between the traces, and the line of the control.
-fn legend(traces: &[TraceFile], leaders: &[usize], common: &[&(String, f64)]) -> Vec<Entry> {
+/// The legend: differences between the traces, and the line of the control if it is drawn.
+fn legend(traces: &[TraceFile], leaders: &[usize], common: &[&(String, f64)], has_control: bool) -> Vec<Entry> {
     let name = |trace: &TraceFile| {
         let own: Vec<_> = trace.parameters.iter().filter(|entry| !common.contains(entry)).collect();
         let name = trace.name.clone();
@@ -288,7 +314,7 @@ fn legend(traces: &[TraceFile], leaders: &[usize], common: &[&(String, f64)]) ->
     };
     let names: Vec<String> = traces.iter().map(name).collect();
     let mut legend = Entry::of_series(&names, leaders, |place| Key::series(place, traces[place].is_marked()));
-    if traces.iter().any(|trace| trace.column("v_c").is_some()) {
+    if has_control {
         let (v, v_c) = (label::name("v"), label::name("v_c"));
         let thin = Key::Line(control(0));
         if traces.len() == 1 {

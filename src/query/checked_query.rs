@@ -32,6 +32,8 @@ pub struct CheckedQuery {
     pub mixed: Option<QueryError>,
     /// Its comparisons of columns with constants.
     pub comparisons: Comparisons,
+    /// Whether its rows are groups without an order.
+    pub is_unordered: bool,
 }
 
 /// Functions of text. In polars they take text alone; functions of numbers take text too, and return nulls for it.
@@ -92,8 +94,10 @@ impl CheckedQuery {
         let units = units(&query, &tables);
         let read = sources.iter().filter(|source| check.read.contains(&source.name)).collect();
         let comparisons = Comparisons::of(&mut query, read);
+        let is_grouped = matches!(query.body.as_ref(), SetExpr::Select(select) if !is_empty(&select.group_by));
+        let is_unordered = is_grouped && query.order_by.is_none() && query.limit_clause.is_none();
         walk(query.as_mut(), &mut PolarsDialect { words });
-        Ok(CheckedQuery { query, units, read: check.read, mixed: check.mixed, comparisons })
+        Ok(CheckedQuery { query, units, read: check.read, mixed: check.mixed, comparisons, is_unordered })
     }
 }
 

@@ -1,8 +1,9 @@
 //! Comparisons of columns with constants that hold for no row by mistake: a word that a column never has, or a number without all its digits.
 
+use std::collections::HashSet;
 use std::ops::ControlFlow;
 
-use sqlparser::ast::{BinaryOperator, Expr, Query, UnaryOperator, Value, VisitorMut};
+use sqlparser::ast::{BinaryOperator, Expr, Query, Select, SelectItem, UnaryOperator, Value, VisitorMut};
 
 use super::Source;
 use super::checked_query::name;
@@ -21,21 +22,45 @@ pub struct Comparisons {
 impl Comparisons {
     /// The comparisons in `query` with columns of the `sources` that it reads.
     pub fn of(query: &mut Query, sources: Vec<&Source>) -> Comparisons {
-        let mut search = Search { sources, found: Comparisons::default() };
+        let mut aliases = Aliases::default();
+        walk(query, &mut aliases);
+        let mut search = Search { sources, aliases: aliases.0, found: Comparisons::default() };
         walk(query, &mut search);
         search.found
     }
 }
 
+/// The names after AS in a query.
+#[derive(Default)]
+struct Aliases(HashSet<String>);
+
+impl VisitorMut for Aliases {
+    type Break = ();
+
+    fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {
+        for item in &select.projection {
+            if let SelectItem::ExprWithAlias { alias, .. } = item {
+                self.0.insert(alias.value.clone());
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// Digits from which a number is probably copied from a table and rounded. Chosen: specs have fewer.
+const MIN_ROUNDED_DIGITS: usize = 5;
+
 struct Search<'a> {
     sources: Vec<&'a Source>,
+    /// Names that may stand for other columns than those of the tables.
+    aliases: HashSet<String>,
     found: Comparisons,
 }
 
 impl Search<'_> {
     fn read(&mut self, column: &str, constant: &Expr) {
         let has = |source: &&&Source| source.columns.iter().any(|known| known == column);
-        if !self.sources.iter().any(|source| has(&source)) {
+        if self.aliases.contains(column) || !self.sources.iter().any(|source| has(&source)) {
             return;
         }
         let of_tables = self.sources.iter().filter(has).flat_map(|source| table::vocabulary(&source.name, column));
@@ -46,7 +71,7 @@ impl Search<'_> {
                     let words = vocabulary.join(", ");
                     self.found.words.push(format!("`{column}` is never '{word}'; it is one of {words}"));
                 }
-                Value::Number(number, _) if number.contains(['.', 'e', 'E']) => {
+                Value::Number(number, _) if digits(number) >= MIN_ROUNDED_DIGITS => {
                     let close = format!("{column} BETWEEN {number} * (1 - 1e-6) AND {number} * (1 + 1e-6)");
                     self.found
                         .numbers
@@ -80,4 +105,10 @@ impl VisitorMut for Search<'_> {
         }
         ControlFlow::Continue(())
     }
+}
+
+/// The significant digits of a number.
+fn digits(number: &str) -> usize {
+    let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
+    mantissa.trim_start_matches(['0', '.']).chars().filter(char::is_ascii_digit).count()
 }

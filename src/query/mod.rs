@@ -18,7 +18,7 @@ mod walk;
 use std::path::Path;
 use std::sync::Arc;
 
-use polars::prelude::{IntoLazy, LazyFrame, PolarsError, PolarsResult, Schema};
+use polars::prelude::{IntoLazy, LazyFrame, PolarsError, PolarsResult, Schema, SortMultipleOptions};
 use polars::sql::SQLContext;
 
 use crate::dataset::{DatasetError, guarded};
@@ -116,6 +116,13 @@ fn plan<'a>(tables: impl IntoIterator<Item = (&'a str, LazyFrame)>, sql: &str) -
     context.execute(sql)
 }
 
+/// The rows in the order of their columns, so that each run of a query has the same answer.
+fn sorted(frame: LazyFrame, schema: &Schema) -> LazyFrame {
+    let columns = schema.iter().filter(|(_, kind)| !kind.is_nested()).map(|(name, _)| name.clone());
+    let columns: Vec<_> = columns.collect();
+    if columns.is_empty() { frame } else { frame.sort(columns, SortMultipleOptions::default()) }
+}
+
 impl Tables {
     fn of(source: Source) -> Tables {
         Tables { sources: vec![source], absent: Vec::new() }
@@ -150,6 +157,7 @@ impl Tables {
             return Err(error);
         }
         let columns: Vec<String> = schema.iter_names().map(ToString::to_string).collect();
+        let frame = if checked.is_unordered { sorted(frame, &schema) } else { frame };
         let unit = |name: &String| {
             let known = checked.units.iter().find(|(column, _)| column == name);
             known.map_or_else(String::new, |(_, unit)| unit.clone())
@@ -187,6 +195,10 @@ impl Tables {
                 return QueryError::sql(found, "choose a name after AS that no table has");
             }
             let read = || self.sources.iter().filter(|source| checked.read.contains(&source.name));
+            if read().any(|source| source.columns.iter().any(|column| column == name)) {
+                let help = "select it, too, or use a subquery: FROM (SELECT …) AS t ORDER BY …";
+                return QueryError::sql(format!("`{name}` is in ORDER BY, but not in SELECT"), help);
+            }
             let columns = || read().flat_map(|source| &source.columns).map(String::as_str);
             let is_optional = |source: &&Source| {
                 let table = table::find(&source.name);
@@ -227,7 +239,11 @@ impl Tables {
         let (found, help) = if known("GROUP BY clause") {
             let name = line.split('\'').nth(1).unwrap_or_default();
             let found = format!("`{name}` is neither in GROUP BY nor in an aggregate");
-            (found, format!("add it to GROUP BY, or write min({name}) or max({name})"))
+            let help =
+                format!("add it to GROUP BY, or write min({name}) or max({name}); a name after AS must be no column");
+            (found, help)
+        } else if known("datatypes of join keys") {
+            ("ON compares a column with a constant".to_owned(), "write the comparison in WHERE".to_owned())
         } else if known("group_by keys contained duplicate") {
             let help = "name them in a subquery: FROM (SELECT upper(x) AS a, length(x) AS b FROM t) AS s GROUP BY a, b";
             ("two keys of GROUP BY are functions of one column".to_owned(), help.to_owned())

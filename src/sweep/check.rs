@@ -175,7 +175,10 @@ impl Sweep {
         warnings.extend(unused(spec, &grid, &requests));
         for (prefix, block) in prefixes.iter().zip(&grid.blocks) {
             let axes = block.factors.iter().flat_map(|factor| &factor.axes);
-            warnings.extend(doubtful_axes(prefix, &grid.units, axes));
+            // A condition may drop the points outside.
+            if block.condition.is_none() {
+                warnings.extend(doubtful_axes(prefix, &grid.units, axes));
+            }
         }
         read::find_lines(text, &mut warnings);
         Ok(Sweep {

@@ -100,6 +100,8 @@ fn columns_of_joined_tables_are_grouped_under_new_names() {
     );
     assert_eq!(asked(&query("least")), least);
     assert_eq!(asked(&query("work")), least.replace("least", "work"));
+    let words = "SELECT o.status, c.t_f, max(c.work) AS most FROM optimal o JOIN best_cubic c ON o.a = c.a GROUP BY o.status, c.t_f";
+    assert_eq!(asked(words), asked(&format!("{words} ORDER BY o.status, c.t_f")));
     let (code, message) = refused(folder.path(), &["query", "results/test", &query("v_i")]);
     assert!(code == 1 && message.contains("choose a name after AS that no table has"), "{message}");
 }
@@ -120,12 +122,16 @@ fn comparisons_with_unknown_words_or_rounded_numbers_are_noted() {
         assert!(note.starts_with("note: `status` is never 'OK'; it is one of ok, below_bound, "), "{note}");
         assert_eq!(note.lines().count(), 1, "{note}");
     }
+    assert_eq!(asked("t_f = 0.038", "t_f"), ("t_f\n".to_owned(), String::new()));
     let (answer, note) = asked("t_f = 0.0370001", "t_f");
     assert_eq!(answer, "t_f\n");
     let close = "t_f BETWEEN 0.0370001 * (1 - 1e-6) AND 0.0370001 * (1 + 1e-6)";
     assert_eq!(note, format!("note: `=` compares all digits of `t_f`; for a rounded number, write {close}\n"));
     assert_eq!(asked(&close.replace("0.0370001", "0.037"), "t_f"), ("t_f\n0.037\n".to_owned(), String::new()));
-    for condition in ["status = 'ok'", "t_f = 0.037", "v_i = 3"] {
+    // A name after AS has words of its own.
+    let renamed = "SELECT count(*) AS n FROM (SELECT 'good' AS status FROM best_cubic) AS t WHERE status = 'good'";
+    assert_eq!(printed(folder.path(), &["query", "results/test", renamed]), "n\n3\n");
+    for condition in ["status = 'ok'", "t_f = 0.037", "t_f = 0.038 OR v_i = 3"] {
         assert_eq!(asked(condition, "count(*) > 0 AS found"), ("found\ntrue\n".to_owned(), String::new()));
     }
 }

@@ -301,6 +301,12 @@ fn traces_are_drawn_over_each_other() {
     for part in ["v, vc (106 v0)", "k = 0.0075 μ0 σ/l", "vi = 105 v0", "vf = 3.2×106 v0", "\nv\nvc\n"] {
         assert!(spring.contains(part), "{part} in {spring}");
     }
+    // A phase portrait: one panel of friction over velocity, without the control velocity.
+    shown(folder, &["plot", "spring.parquet", "--x", "v", "--y", "tau", "--out", "phase.svg"]);
+    let phase = words(&read(folder, "phase.svg"));
+    assert!(phase.contains("τ (μ0 σ)") && phase.contains("\nv (") && !phase.contains("vc"), "{phase}");
+    let message = complaint(folder, &["plot", "spring.parquet", "--x", "u"]);
+    assert!(message.starts_with("error: --x: the trace has no column `u`\n  found: t, v, theta, tau"), "{message}");
     fs::copy(folder.join("best.csv"), folder.join("my_<best>*\u{1}.csv")).expect("is writable");
     shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.png"]);
     shown(folder, &["plot", "my_<best>*\u{1}.csv", "--out", "odd.svg"]);

@@ -60,6 +60,10 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
+    // A label stands for the axes of its points.
+    let of_label = request.colour.as_deref().filter(|colour| filtered.is_label(colour));
+    let of_label = of_label.and_then(|_| choice.varying.iter().find(|axis| filtered.is_of_point(&axis.name)));
+    let colour = colour.or(of_label.map(|axis| axis.name.as_str()).filter(|name| *name != x));
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
     Ok(Shape::Lines(lines::LineColumns { x, y, series }))
 }

@@ -42,8 +42,12 @@ pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&
     Ok((further, note))
 }
 
-/// Whether the rows are scattered points over `x`, such as materials: an axis that changes with `x` is not monotone in it.
+/// Whether the rows are scattered points over `x`, such as materials: it is an axis of labelled points, or an axis that changes with it is not monotone
+/// in it.
 pub fn is_scattered(filtered: &FilteredTable, x: &str, further: &[&str]) -> Result<bool, PlotError> {
+    if filtered.is_of_point(x) {
+        return Ok(true);
+    }
     for axis in filtered.axes.iter().filter(|axis| axis.varies() && axis.name != x && axis.words.is_empty()) {
         if !further.contains(&axis.name.as_str()) && !filtered.follows(&axis.name, x)? {
             return Ok(true);
