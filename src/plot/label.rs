@@ -301,6 +301,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_fonts_have_the_letters_of_european_languages() {
+        let known = "Åland röd, São José, Grès, Øre ß ñ ç, 25 °C, 10 µm, Łódź, Çeşme, α–β";
+        assert_eq!(missing_letters(known), BTreeSet::new());
+        assert_eq!(missing_letters("a 花"), BTreeSet::from(['花']));
+    }
+
+    #[test]
     fn up_to_three_texts_are_named() {
         assert_eq!(few(&["a", "b", "c"]), "a; b; c");
         assert_eq!(few(&["a", "b", "c", "d"]), "a and 3 more");

@@ -628,17 +628,20 @@ impl PolarsDialect {
     }
 }
 
-/// The keys of GROUP BY that are columns of joined tables with new names, such as `least` in `c.gap AS least`: polars does not find `c.gap` beside an
-/// aggregate of another column `gap`.
-fn renamed_keys(select: &Select) -> Vec<(Expr, Ident)> {
+/// The keys of GROUP BY that are columns of joined tables, with their names in SELECT, such as `least` in `c.gap AS least`: polars does not find
+/// `c.gap` beside an aggregate of another column `gap`.
+fn named_keys(select: &Select) -> Vec<(Expr, Ident)> {
     let GroupByExpr::Expressions(keys, _) = &select.group_by else { return Vec::new() };
-    let renamed = |item: &SelectItem| match item {
-        SelectItem::ExprWithAlias { expr: expr @ Expr::CompoundIdentifier(_), alias } if keys.contains(expr) => {
-            Some((expr.clone(), alias.clone()))
-        }
-        _ => None,
+    let named = |item: &SelectItem| {
+        let key = expression(item).filter(|key| keys.contains(key))?;
+        let Expr::CompoundIdentifier(names) = key else { return None };
+        let name = match item {
+            SelectItem::ExprWithAlias { alias, .. } => alias.clone(),
+            _ => names.last()?.clone(),
+        };
+        Some((key.clone(), name))
     };
-    select.projection.iter().filter_map(renamed).collect()
+    select.projection.iter().filter_map(named).collect()
 }
 
 /// Whether a name is that of the column itself.
@@ -656,10 +659,10 @@ impl VisitorMut for PolarsDialect {
 
     fn pre_visit_query(&mut self, query: &mut Query) -> ControlFlow<()> {
         let SetExpr::Select(select) = query.body.as_ref() else { return ControlFlow::Continue(()) };
-        let renamed = renamed_keys(select);
+        let named = named_keys(select);
         if let Some(OrderByKind::Expressions(keys)) = query.order_by.as_mut().map(|order| &mut order.kind) {
             for key in keys {
-                if let Some((_, name)) = renamed.iter().find(|(known, _)| *known == key.expr) {
+                if let Some((_, name)) = named.iter().find(|(known, _)| *known == key.expr) {
                     key.expr = Expr::Identifier(name.clone());
                 }
             }
@@ -673,7 +676,7 @@ impl VisitorMut for PolarsDialect {
                 order_nulls(&mut window.order_by);
             }
         }
-        for (key, name) in renamed_keys(select) {
+        for (key, name) in named_keys(select) {
             if let (false, GroupByExpr::Expressions(keys, _)) = (is_own_name(&key, &name), &mut select.group_by) {
                 keys.iter_mut()
                     .filter(|known| **known == key)

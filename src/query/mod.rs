@@ -239,8 +239,10 @@ impl Tables {
         let (found, help) = if known("GROUP BY clause") {
             let name = line.split('\'').nth(1).unwrap_or_default();
             let found = format!("`{name}` is neither in GROUP BY nor in an aggregate");
-            let help =
-                format!("add it to GROUP BY, or write min({name}) or max({name}); a name after AS must be no column");
+            let mut help = format!("add it to GROUP BY, or write min({name}) or max({name})");
+            if sql.to_lowercase().contains(" as ") {
+                help.push_str("; choose names after AS that no column has");
+            }
             (found, help)
         } else if known("datatypes of join keys") {
             ("ON compares a column with a constant".to_owned(), "write the comparison in WHERE".to_owned())
