@@ -629,7 +629,7 @@ impl PolarsDialect {
 }
 
 /// The keys of GROUP BY that are columns of joined tables, with their names in SELECT, such as `least` in `c.gap AS least`: polars does not find
-/// `c.gap` beside an aggregate of another column `gap`.
+/// `c.gap` if there is an aggregate of another column `gap`.
 fn named_keys(select: &Select) -> Vec<(Expr, Ident)> {
     let GroupByExpr::Expressions(keys, _) = &select.group_by else { return Vec::new() };
     let named = |item: &SelectItem| {

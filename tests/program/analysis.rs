@@ -85,7 +85,7 @@ fn the_tables_that_are_there_are_read() {
     assert!(code == 1 && message.ends_with("did you mean `results/test`?\n"), "{message}");
 }
 
-/// A key of GROUP BY may have a new name beside an aggregate of a column of the same name in another table.
+/// A key of GROUP BY may have a new name with an aggregate of a column of the same name in another table.
 #[test]
 fn columns_of_joined_tables_are_grouped_under_new_names() {
     let folder = small();

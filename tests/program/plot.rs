@@ -633,7 +633,7 @@ fn drawn(folder: &Path, arguments: &[&str]) -> (String, String) {
 
 /// Seven of ten labelled points, evenly spread over the file of points: the picture and the terminal speak of labels.
 #[test]
-fn lines_of_labelled_points_are_an_even_choice_and_the_picture_says_so() {
+fn lines_of_labelled_points_are_an_even_choice_and_the_picture_states_it() {
     let folder = materials("t_f = { geomspace = [0.01, 0.1, 9] }", "[tables.optimal]");
     let folder = folder.path();
     let (said, words) = drawn(folder, &["--table", "optimal", "--y", "work"]);

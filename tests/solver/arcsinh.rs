@@ -123,10 +123,10 @@ fn is_proven(transition: &Transition) -> bool {
     a * scaled_friction(level) * (1.0 - 1e-4) > (b - a) * reduction(level).0
 }
 
-/// Next to steady sliding, where the durations of both branches meet, and far below the turning point with almost no friction. Works by quadrature at 50
+/// Near steady sliding, where the durations of both branches meet, and far below the turning point with almost no friction. Works by quadrature at 50
 /// digits (`tests/reference/arcsinh.py`).
 #[test]
-fn regress_optima_next_to_steady_sliding_converge() {
+fn regress_optima_near_steady_sliding_converge() {
     for (t_f, a, b, v_i, v_f, work) in [
         (0.004285714285714286, 0.25, 0.5, 7.0, 7.00007, 0.01553332993162),
         (

@@ -215,7 +215,7 @@ fn surplus_slope(steady: f64, p: f64) -> f64 {
 }
 
 /// `|ln u|` up to which [`surplus`] is an integral, and the nodes of that. Derived: the difference loses one digit beyond; the singularities
-/// `pi/2` beside the real axis leave `120^-8`.
+/// `pi/2` from the real axis leave `120^-8`.
 const NEAR_STEADY: f64 = 0.05;
 const NODES: usize = 4;
 
