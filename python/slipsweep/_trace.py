@@ -35,9 +35,9 @@ class Trace(Columns):
         """The protocol in a few lines, as the command line prints them."""
         return self._trace.header
 
-    def plot(self, *others: "Trace", width: float | None = None) -> Picture:
-        """The picture that `slipsweep plot` draws of this trace, and of `others` over it."""
-        return Picture(_core.plot_traces([self._trace, *(other._trace for other in others)], width))
+    def plot(self, *others: "Trace", x: str | None = None, y: str | None = None, width: float | None = None) -> Picture:
+        """The picture that `slipsweep plot` draws of this trace, and of `others` over it: over time, or column `y` over `x`."""
+        return Picture(_core.plot_traces([self._trace, *(other._trace for other in others)], x, y, width))
 
     def __repr__(self) -> str:
         return f"{self.header}\n{super().__repr__()}"

@@ -44,10 +44,15 @@ impl Trace {
 
 /// The picture of traces as SVG.
 #[pyfunction]
-#[pyo3(signature = (traces, width=None))]
-pub fn plot_traces(traces: Vec<PyRef<'_, Trace>>, width: Option<f64>) -> PyResult<String> {
+#[pyo3(signature = (traces, x=None, y=None, width=None))]
+pub fn plot_traces(
+    traces: Vec<PyRef<'_, Trace>>,
+    x: Option<&str>,
+    y: Option<&str>,
+    width: Option<f64>,
+) -> PyResult<String> {
     let files = traces.iter().map(|trace| TraceFile::of(&trace.0.trace, &trace.0.units, &trace.0.facts));
-    let figure = figure(&files.collect::<Vec<_>>()).map_err(|error| error::plot(&error))?;
+    let figure = figure(&files.collect::<Vec<_>>(), [x, y]).map_err(|error| error::plot(&error))?;
     let width = width.unwrap_or(if figure.columns > 1 { PAGE } else { COLUMN });
     Ok(figure.draw(width).svg)
 }

@@ -237,6 +237,9 @@ def test_traces_are_those_of_the_command(tmp_path, dataset):
     assert trace.plot() == trace._repr_html_() == (tmp_path / "optimal.svg").read_text()
     both = trace.plot(ss.trace("best_cubic", **PAPER))
     assert both.startswith("<svg") and both != trace.plot()
+    assert trace.plot(x="v", y="tau") != trace.plot(x="v")
+    with pytest.raises(ValueError, match="no column `bogus`"):
+        trace.plot(x="bogus")
     assert dataset["optimal"].trace(row=1).facts["row"] == 1
     assert trace.to_xarray()["v"].attrs["units"] == "v_0"
     with pytest.raises(ValueError, match="`optimal` needs --v-f"):
