@@ -347,7 +347,7 @@ fn unknown_column(place: &impl Display, name: &str) -> SpecError {
     let expected = format!("{}; or a label, a column of text", error.expected);
     let help = match error.help.strip_prefix("did you mean") {
         _ if super::units::UNIT_KEYS.contains(&name) => {
-            "scales stand in [model]: write a spec for each material, or convert the points to dimensionless values"
+            "scales belong to [model]: write a spec for each material, or convert the points to dimensionless values"
                 .into()
         }
         Some(_) => error.help,
