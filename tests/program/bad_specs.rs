@@ -127,6 +127,27 @@ fn doubtful_axes_and_scales() {
     }
 }
 
+/// Axes outside the physical domain are computed with a warning, unless a condition may drop those points.
+#[test]
+fn axes_outside_the_physical_domain() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let warnings = |spec: &str| {
+        fs::write(folder.path().join("far.toml"), spec).expect("is writable");
+        String::from_utf8_lossy(&slipsweep(&["plan", "far.toml"], folder.path()).stderr).into_owned()
+    };
+    let spec = "name = \"far\"\n[axes]\nt_f = [0.02, 0.04]\na = [0.03, 0.5]\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n[tables.optimal]\n";
+    let help = "help: check the unit; outside the physical domain rows may have no numbers\n";
+    let expected =
+        format!("warning: far.toml:4: axes.a: 0.5 is outside the physical domain\n  expected: 0.001 to 0.3\n  {help}");
+    assert_eq!(warnings(spec), expected);
+    assert_eq!(warnings(&spec.replace("[axes]", "where = \"a < 0.3\"\n[axes]")), "");
+    assert_eq!(warnings(&spec.replace(", 0.5]", ", 0.3]")), "");
+    let si = "name = \"si\"\n[model]\nunits = \"si\"\nmu_0 = 0.6\nl = 20e-6\nv_0 = 1e-8\nnormal_stress = 5e6\n[axes]\nt_f = 1e-6\n\
+              a = 0.01\nb = 0.015\nv_i = 1e-6\nv_f = 1e-4\n[tables.optimal]\n";
+    let slip = "axes.t_f: a slip of t_f max(v_i, v_f) = 5e-6 slip distances is outside the physical domain";
+    assert!(warnings(si).contains(slip), "{}", warnings(si));
+}
+
 /// Values that are legal, and yet probably in other units, are computed with a warning.
 #[test]
 fn doubtful_velocities() {

@@ -471,6 +471,27 @@ fn a_row_without_a_path_states_why() {
         let found = complaint(arguments);
         assert!(found.starts_with(expected), "{arguments:?}: {found}");
     }
+    // In SI the last time is the duration of the row, to the last digit.
+    for t_f in ["2e1", "3e2"] {
+        let condition = format!("t_f={t_f}, v_i=3e-9");
+        let arguments = ["results/rows", "optimal", "--where", &condition, "--points", "7", "--format", "csv"];
+        let output = trace(folder.path(), &[&arguments]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let last = text.lines().last().and_then(|line| line.split(',').next()).and_then(|t| t.parse::<f64>().ok());
+        assert_eq!(last, t_f.parse::<f64>().ok(), "{text}");
+    }
+    // The summary of a table without a feasible row has the reason, too.
+    let spec = "name = \"slow\"\n[axes]\nt_f = 1e-3\na = 0.03\nb = 0.05\nv_i = 100.0\nv_f = 3.0\n[tables.optimal]\n";
+    fs::write(folder.path().join("slow.toml"), spec).expect("is writable");
+    for arguments in [["run", "slow.toml"], ["summary", "results/slow"]] {
+        let output = Command::new(env!("CARGO_BIN_EXE_slipsweep"))
+            .current_dir(folder.path())
+            .args(arguments)
+            .output()
+            .expect("runs");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains("  row 0 is infeasible: t_f = 0.001 is too short for v >= 1: the least is "), "{text}");
+    }
     assert!(complaint(&["optimal", "--where", "t_f=7"]).contains("\n  help: the nearest rows have --where \"t_f="));
     assert!(complaint(&["optimal", "--where", "t_f>0"]).contains("help: --row 0, or a condition on t_f, v_i"));
     assert!(complaint(&["step_response", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
