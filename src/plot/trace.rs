@@ -104,7 +104,7 @@ impl TraceFile {
     /// Its points in a panel: the column `name` over `x`.
     fn points(&self, x: &str, name: &str) -> Option<Vec<(f64, f64)>> {
         let (x, values) = (self.column(x)?, self.column(name)?);
-        Some(thinned(x.cells.iter().copied().zip(values.cells.iter().copied()).collect()))
+        Some(x.cells.iter().copied().zip(values.cells.iter().copied()).collect())
     }
 
     /// # Errors
@@ -219,8 +219,9 @@ pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure,
         let bound = Layer::Level(1.0, Stroke { colour: "#888", width: 0.5, dashes: &[1.0, 1.5] });
         let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
         let layers = has_bound.then_some(bound).into_iter().collect();
+        let fewer = |points| if x == "t" { thinned(points) } else { spaced(points, [&x_axis.scale, &y.scale]) };
         let of_course = |(trace, of): (usize, &TraceFile)| {
-            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(x, name)));
+            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(x, name).map(fewer)));
             points.filter_map(|(rank, points)| Some(Curve { trace, rank, points: points? })).collect::<Vec<_>>()
         };
         let curves: Vec<Curve> = traces.iter().enumerate().flat_map(of_course).collect();
@@ -355,11 +356,47 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     kept
 }
 
+/// Greatest number of points of a curve that may turn back. Chosen: a hundred loops stay smooth.
+const MAX_TURNING_POINTS: usize = 40_000;
+
+/// Least distance of the points of such a curve, as a fraction of the panel. Chosen: half a dot of a wide picture in print.
+const MIN_DISTANCE: f64 = 5e-4;
+
+/// Points at equal distances along a curve over these scales, at least, with the first and the last.
+fn spaced(points: Vec<(f64, f64)>, [x, y]: [&Scale; 2]) -> Vec<(f64, f64)> {
+    let distance = |from: (f64, f64), to: (f64, f64)| {
+        (x.fraction(to.0) - x.fraction(from.0)).hypot(y.fraction(to.1) - y.fraction(from.1))
+    };
+    let length: f64 = points.windows(2).map(|pair| distance(pair[0], pair[1])).filter(|step| step.is_finite()).sum();
+    let step = (length / MAX_TURNING_POINTS as f64).max(MIN_DISTANCE);
+    let last = points.len().saturating_sub(1);
+    let mut kept: Vec<(f64, f64)> = Vec::new();
+    for (place, point) in points.into_iter().enumerate() {
+        let is_near = kept.last().is_some_and(|before| distance(*before, point) < step);
+        if !is_near || place == last {
+            kept.push(point);
+        }
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     //! Thinning preserves the visible curve.
 
     use super::*;
+
+    /// A spiral of fifty turns keeps its radius.
+    #[test]
+    fn a_curve_that_turns_back_stays_smooth() {
+        let angle = |i: u32| f64::from(i) * 1e-3;
+        let points: Vec<(f64, f64)> = (0..314_160).map(|i| (angle(i).cos(), angle(i).sin())).collect();
+        let scale = Scale { low: -1.0, high: 1.0, log: false };
+        let kept = spaced(points.clone(), [&scale, &scale]);
+        assert!(kept.len() <= MAX_TURNING_POINTS + 2, "{}", kept.len());
+        assert!(kept.windows(2).all(|pair| (pair[0].0 - pair[1].0).hypot(pair[0].1 - pair[1].1) < 0.02));
+        assert_eq!((kept.first(), kept.last()), (points.first(), points.last()));
+    }
 
     #[test]
     fn thinning_keeps_every_extreme() {
