@@ -88,7 +88,9 @@ impl Condition {
         let wrong = || PlotError::Condition { text: text.trim().to_owned() };
         // The first sign; of several at one position, the longest, which comes first in `SIGNS`.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
-        let list = text.to_lowercase().find(" in ").or_else(|| text.to_lowercase().find(" in("));
+        // In ASCII alone, places are those of the text.
+        let lower = text.to_ascii_lowercase();
+        let list = lower.find(" in ").or_else(|| lower.find(" in("));
         let found = found.chain(list.map(|place| (place, " in".len(), Relation::Equal)));
         let (place, length, relation) = found.min_by_key(|(place, ..)| *place).ok_or_else(wrong)?;
         let (column, typed) = (text[..place].trim(), text[place + length..].trim());
@@ -314,6 +316,8 @@ mod tests {
         }
         assert!(conditions[1].holds(0.3) && !conditions[1].holds(0.1));
         assert!(conditions[1].may_hold(0.2, 0.4) && !conditions[1].may_hold(0.04, 0.2));
+        // A letter with a longer lower case.
+        assert_eq!(Condition::all("İ in (a)").expect("a condition")[0].column, "İ");
         assert_eq!(Condition::all("sample=weakening G1").expect("a condition")[0].typed(None), "sample='weakening G1'");
     }
 
