@@ -649,3 +649,30 @@ fn regress_the_least_velocity_may_lie_inside_the_optimum() {
     let seen = places.fold(f64::INFINITY, f64::min);
     assert!(v_min < 1e-12 && v_min <= seen * (1.0 + 1e-9) && v_min > 0.9 * seen, "{v_min} {seen}");
 }
+
+/// Between almost equal velocities the excess is a small difference of works. True gaps by Taylor series at 50 digits (`tests/reference/generate_regularised.py`).
+#[test]
+fn regress_small_gaps_keep_their_digits() {
+    let cases = [
+        (
+            [0.001963687063027459, 0.006204606955667535, 1.276671596367123, 1.275671439236018],
+            [8.534225157262075, 3.542646449679203e-10, 0.0028378018729460597, 0.0008513405618838179],
+            1.2031242657e-5,
+        ),
+        (
+            [0.0015584197899592008, 0.0, 13.920437906803139, 13.919649735078002],
+            [f64::INFINITY, 0.0, 0.00011046875711315495, 9.345128677400449e-06],
+            9.20409145177e-6,
+        ),
+    ];
+    for ([a, b, v_i, v_f], [k, m, t_f, delta_t], gap) in cases {
+        let slider = SpringBlock { law: Law { a, b }, k, m };
+        for rtol in [1e-2, 1e-6, 1e-10] {
+            let found =
+                regularised::solve(&slider, (v_i, v_f), t_f, delta_t, true, rtol).value.expect("has numbers").gap;
+            let error = (found / gap - 1.0).abs();
+            // The reference has eleven digits, and rounding leaves some epsilon over the gap.
+            assert!(error <= rtol + 1e-10, "{a} {rtol:e}: {found:e} {gap:e}");
+        }
+    }
+}

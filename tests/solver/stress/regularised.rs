@@ -88,7 +88,9 @@ fn accurate(point: &Point, rough: &Regularised, row: &mut Row) {
     let Some(fine) = found.value else { return row.fact("exists at 1e-12", false) };
     let noise = 2.0 * (rtol + FINE);
     row.agree("work to rtol", rough.work, fine.work, noise);
-    row.at_most("gap to rtol", (rough.gap - fine.gap).abs(), noise * (1.0 + fine.gap));
+    // Rounding of the works of the pieces, and of their times.
+    let rounding = 4.0 * f64::EPSILON * (1.0 + fine.gap.abs() * t_f / delta_t);
+    row.at_most("gap to rtol", (rough.gap - fine.gap).abs(), noise * fine.gap.abs() + rounding);
     // The ends of a piece have slopes of the order of 1/a in time, and curvatures of their square.
     let slope = delta_t / slider.law.a;
     let short = velocities.0.min(velocities.1) - 1.0;
