@@ -18,8 +18,10 @@ use crate::trace::{self, COLUMNS, Trace};
 /// Greatest number of points of a line; longer lines are thinned. Chosen: four points per dot of a wide picture in print.
 const MAX_POINTS: usize = 8000;
 
-/// Ratio of height to width of one of several panels, and of a single one. Chosen: three of them make a square.
+/// Ratio of height to width of one of several panels. Chosen: three of them make a square.
 const ASPECT: f64 = 0.42;
+
+/// Ratio of height to width of a single panel. Chosen: that of a slide.
 const ASPECT_OF_ONE: f64 = 0.75;
 
 /// The columns of each panel. The velocity of the block and the control velocity are in one panel.

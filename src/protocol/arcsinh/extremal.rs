@@ -109,8 +109,8 @@ impl Extremal {
             Chart::Turning { ln_theta, theta, level, friction } => {
                 let fall = x * x;
                 let target = friction * exp(-fall);
-                // Far from the turning point both terms fall by decades, and close to it they hardly differ.
-                let deficit = if fall > 0.5 {
+                // Near the turning point the frictions are almost equal, and far from it their changes.
+                let deficit = if fall > FAR_FALL {
                     scaled_friction(level - gain * fall) - target
                 } else {
                     friction_rise(level, -gain * fall) - friction * exp_m1(-fall)
@@ -213,6 +213,9 @@ fn surplus_slope(steady: f64, p: f64) -> f64 {
     let (f, rest) = reduction(steady + p);
     exp_m1(p) * f * (1.0 + rest)
 }
+
+/// Fall of `ln theta` from which frictions are compared instead of their changes. Derived: either loses less than a digit there.
+const FAR_FALL: f64 = 0.5;
 
 /// `|ln u|` up to which [`surplus`] is an integral, and the nodes of that. Derived: the difference loses one digit beyond; the singularities
 /// `pi/2` from the real axis leave `120^-8`.

@@ -40,7 +40,8 @@ struct Problem {
 /// The optimum of duration `t_f`, to rounding.
 ///
 /// `Infeasible` unless `t_f` is above [`least_time`], and outside the domain (`a > 0`, `b >= 0`, `v_i, v_f > 0`, `t_f > 0`, all finite). `Unproven`
-/// where steady friction at the least theta is at most `(b - a) tanh(tau/a)`, but for rounding, which needs `b >= 2 a`: extremals need not be unique there.
+/// where steady friction at the least theta is not above `(b - a) tanh(tau/a)` by more than a ten-thousandth, which needs `b` close to `2 a` or more:
+/// extremals need not be unique there.
 pub fn solve(transition: &Transition, t_f: f64) -> Solved<Regularised> {
     extremal(transition, t_f).map(|(found, _)| found)
 }
