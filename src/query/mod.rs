@@ -180,6 +180,45 @@ impl Tables {
         Some(self.explain(sql, &checked, &answered?.err()?))
     }
 
+    /// The fault of a query with a column that no table has, according to a `line` of polars.
+    fn missing_column(&self, sql: &str, checked: &CheckedQuery, line: &str) -> QueryError {
+        let name = line.split(['"', '\'']).nth(1).unwrap_or_default();
+        // polars joins tables with such names.
+        if let Some((column, table)) = name.split_once(':') {
+            let found = format!("`{table}.{column}` with the name of another column");
+            return QueryError::sql(found, "choose a name after AS that no table has");
+        }
+        let read = || self.sources.iter().filter(|source| checked.read.contains(&source.name));
+        if read().any(|source| source.columns.iter().any(|column| column == name)) {
+            let help = "select it, too, or use a subquery: FROM (SELECT …) AS t ORDER BY …";
+            return QueryError::sql(format!("`{name}` is in ORDER BY, but not in SELECT"), help);
+        }
+        let columns = || read().flat_map(|source| &source.columns).map(String::as_str);
+        let is_optional = |source: &&Source| {
+            let table = table::find(&source.name);
+            table.is_some_and(|table| table.columns().iter().any(|column| column.name == name))
+        };
+        let help = match nearest(name, columns()) {
+            _ if ["inf", "infinity", "nan"].contains(&name.to_lowercase().as_str()) => {
+                format!("CAST('{name}' AS DOUBLE) is this number")
+            }
+            _ if read().any(|source| is_optional(&source)) => {
+                "the dataset lacks this optional column; name it in `columns` of a spec with another `name`, and run that".to_owned()
+            }
+            None if sql.contains(&format!("\"{name}\"")) => {
+                format!("text goes in single quotes: '{name}'; double quotes are for names of columns")
+            }
+            None => format!("choose one of these; text goes in single quotes: '{name}'"),
+            _ => hint(name, columns()),
+        };
+        let tables = read().map(|source| format!("{}: {}", source.name, source.columns.join(", ")));
+        let expected = match tables.collect::<Vec<_>>().join("\n    ") {
+            tables if tables.is_empty() => "FROM and the name of a table".to_owned(),
+            tables => format!("a column of {tables}"),
+        };
+        QueryError::sql(format!("no column `{name}`\n  expected: {expected}"), help)
+    }
+
     /// The fault of a query.
     fn explain(&self, sql: &str, checked: &CheckedQuery, error: &PolarsError) -> QueryError {
         let text = error.to_string();
@@ -188,41 +227,7 @@ impl Tables {
         let line = crate::names::shown(line, MAX_ERROR_CHARS);
         let line = &*line;
         if line.contains("unable to find column") || line.contains("no column named") {
-            let name = line.split(['"', '\'']).nth(1).unwrap_or_default();
-            // polars joins tables with such names.
-            if let Some((column, table)) = name.split_once(':') {
-                let found = format!("`{table}.{column}` with the name of another column");
-                return QueryError::sql(found, "choose a name after AS that no table has");
-            }
-            let read = || self.sources.iter().filter(|source| checked.read.contains(&source.name));
-            if read().any(|source| source.columns.iter().any(|column| column == name)) {
-                let help = "select it, too, or use a subquery: FROM (SELECT …) AS t ORDER BY …";
-                return QueryError::sql(format!("`{name}` is in ORDER BY, but not in SELECT"), help);
-            }
-            let columns = || read().flat_map(|source| &source.columns).map(String::as_str);
-            let is_optional = |source: &&Source| {
-                let table = table::find(&source.name);
-                table.is_some_and(|table| table.columns().iter().any(|column| column.name == name))
-            };
-            let help = match nearest(name, columns()) {
-                _ if ["inf", "infinity", "nan"].contains(&name.to_lowercase().as_str()) => {
-                    format!("CAST('{name}' AS DOUBLE) is this number")
-                }
-                _ if read().any(|source| is_optional(&source)) => {
-                    "the dataset lacks this optional column; name it in `columns` of a spec with another `name`, and run that".to_owned()
-                }
-                None if sql.contains(&format!("\"{name}\"")) => {
-                    format!("text goes in single quotes: '{name}'; double quotes are for names of columns")
-                }
-                None => format!("choose one of these; text goes in single quotes: '{name}'"),
-                _ => hint(name, columns()),
-            };
-            let tables = read().map(|source| format!("{}: {}", source.name, source.columns.join(", ")));
-            let expected = match tables.collect::<Vec<_>>().join("\n    ") {
-                tables if tables.is_empty() => "FROM and the name of a table".to_owned(),
-                tables => format!("a column of {tables}"),
-            };
-            return QueryError::sql(format!("no column `{name}`\n  expected: {expected}"), help);
+            return self.missing_column(sql, checked, line);
         }
         // Names of types and of nodes of the syntax tree of polars mean nothing to a user.
         let is_internal = line.contains("Query {")
