@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 
-use super::trace::traced;
+use super::trace::reason;
 use super::watch::{Wait, waiting};
 use super::{Failure, dataset, say, words};
 use crate::dataset::{
@@ -137,9 +137,7 @@ pub fn infeasibility(dataset: &Path, name: &str, statistics: &TableStatistics) -
     if infeasible == 0 || infeasible < statistics.status.iter().sum() || !TABLES.contains(&name) {
         return String::new();
     }
-    let row = [&*dataset.to_string_lossy(), name, "--row", "0"].map(str::to_owned);
-    let Err(failure) = traced(&row) else { return String::new() };
-    let reason = failure.message.split_once(&format!("row 0 of `{name}`: ")).map(|(_, reason)| reason);
+    let reason = reason(&dataset.to_string_lossy(), name, 0);
     reason.map_or_else(String::new, |reason| format!("  row 0 is infeasible: {reason}\n"))
 }
 

@@ -333,6 +333,18 @@ pub struct Traced {
 ///
 /// The failure that the command reports.
 pub fn traced(arguments: &[String]) -> Result<Traced, Failure> {
+    solved(&parsed(arguments)?)
+}
+
+/// Why the protocol of a row does not exist, in the units of the dataset; `None` if it does, or if the row cannot be read.
+pub fn reason(dataset: &str, table: &str, row: u64) -> Option<String> {
+    let arguments = parsed(&[dataset, table, "--row", &row.to_string()].map(str::to_owned)).ok()?;
+    let request = arguments.row_of(table).ok()?;
+    let absence = request.protocol.path(&request.case, request.rtol).err()?;
+    Some(first_line(&absence.text(&request.units)))
+}
+
+fn parsed(arguments: &[String]) -> Result<Arguments, Failure> {
     /// The command.
     #[derive(clap::Parser)]
     #[command(name = "trace")]
@@ -343,7 +355,12 @@ pub fn traced(arguments: &[String]) -> Result<Traced, Failure> {
     let name = "trace".to_owned();
     let command = <Command as clap::Parser>::try_parse_from(std::iter::once(&name).chain(arguments));
     let command = command.map_err(|error| Failure { code: EXIT_REQUEST, message: error.to_string() })?;
-    solved(&command.arguments)
+    Ok(command.arguments)
+}
+
+/// A message without its help, which names options of a protocol.
+fn first_line(message: &str) -> String {
+    message.lines().next().unwrap_or_default().to_owned()
 }
 
 fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
@@ -451,9 +468,7 @@ impl Arguments {
         let Some(Origin { table, row, .. }) = &request.origin else {
             return Failure { code, message: format!("error: no `{}` protocol: {absence}", request.name) };
         };
-        // The help names options of a protocol.
-        let reason = absence.text(&request.units);
-        let reason = reason.lines().next().unwrap_or_default();
+        let reason = first_line(&absence.text(&request.units));
         Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}", self.subject) }
     }
 

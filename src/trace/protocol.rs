@@ -229,8 +229,6 @@ impl Absence {
             (false, _) => "v > 0",
         };
         let time = |t: f64| shown(units, t, "l/v_0");
-        let size = units.size("l/v_0");
-        let rounded = |t: f64, direction: f64| time(six_digits(t * size, direction) / size);
         match self {
             Absence::Obstacle(Obstacle::Time { t_min }) => {
                 format!("the time is too short for {}: the least is t_min = {}", floor(&true), time(*t_min))
@@ -244,25 +242,7 @@ impl Absence {
                 let (t_f, t_min) = (time(*t_f), time(*t_min));
                 format!("t_f = {t_f} is too short for {}: the least is t_min = {t_min}", floor(bounded))
             }
-            Absence::Ceiling { obstacle, t_f } => match obstacle {
-                optimal::Obstacle::Domain => Obstacle::Domain.to_string(),
-                optimal::Obstacle::TooFast { t_least } => {
-                    let (t_f, least) = (time(*t_f), rounded(*t_least, 1.0));
-                    let found = format!("t_f = {t_f} is too short under these ceilings: the least is {least}");
-                    format!("{found}\n  help: raise --t-f to at least {least}, or raise the ceilings")
-                }
-                optimal::Obstacle::TooSlow { t_most } => {
-                    let (t_f, greatest) = (time(*t_f), rounded(*t_most, -1.0));
-                    let found = format!("t_f = {t_f} is too long under these ceilings: the greatest is {greatest}");
-                    format!("{found}\n  help: lower --t-f to at most {greatest}, or raise the ceilings")
-                }
-                optimal::Obstacle::VCeiling { above } => {
-                    format!("v_ceiling must be above {}", shown(units, *above, "v_0"))
-                }
-                optimal::Obstacle::TauCeiling { above } => {
-                    format!("tau_ceiling must be above {}", shown(units, *above, "mu_0 sigma"))
-                }
-            },
+            Absence::Ceiling { obstacle, t_f } => of_ceiling(obstacle, *t_f, units),
             Absence::State => "no protocol arrives from this theta in the time t_left under these bounds".to_owned(),
             Absence::Cubic { bounded } => format!("no cubic shortcut keeps {} in this time", floor(bounded)),
             Absence::Border => {
@@ -283,6 +263,30 @@ impl Absence {
                 "friction is too low: where tau <= max(0, b - a) an optimum is not guaranteed, and none was found"
                     .to_owned()
             }
+        }
+    }
+}
+
+/// The bound that leaves no protocol of duration `t_f`.
+fn of_ceiling(obstacle: &optimal::Obstacle, t_f: f64, units: &Units) -> String {
+    let size = units.size("l/v_0");
+    let t_f = shown(units, t_f, "l/v_0");
+    let rounded = |t: f64, direction: f64| shown(units, six_digits(t * size, direction) / size, "l/v_0");
+    match obstacle {
+        optimal::Obstacle::Domain => Obstacle::Domain.to_string(),
+        optimal::Obstacle::TooFast { t_least } => {
+            let least = rounded(*t_least, 1.0);
+            let found = format!("t_f = {t_f} is too short under these ceilings: the least is {least}");
+            format!("{found}\n  help: raise --t-f to at least {least}, or raise the ceilings")
+        }
+        optimal::Obstacle::TooSlow { t_most } => {
+            let greatest = rounded(*t_most, -1.0);
+            let found = format!("t_f = {t_f} is too long under these ceilings: the greatest is {greatest}");
+            format!("{found}\n  help: lower --t-f to at most {greatest}, or raise the ceilings")
+        }
+        optimal::Obstacle::VCeiling { above } => format!("v_ceiling must be above {}", shown(units, *above, "v_0")),
+        optimal::Obstacle::TauCeiling { above } => {
+            format!("tau_ceiling must be above {}", shown(units, *above, "mu_0 sigma"))
         }
     }
 }
