@@ -60,9 +60,16 @@ pub fn spans(markup: &str) -> Vec<TextRun> {
     spans
 }
 
-/// A user's text with escaped markup.
+/// A user's text as markup that shows it: braces become parentheses.
 pub fn literal(text: &str) -> String {
-    text.chars().map(|letter| if letter.is_control() || "*_^{}".contains(letter) { ' ' } else { letter }).collect()
+    let shown = |letter: char| match letter {
+        '*' => '∗',
+        '{' => '(',
+        '}' => ')',
+        _ if letter.is_control() => ' ',
+        _ => letter,
+    };
+    text.chars().map(shown).collect()
 }
 
 /// A text in markup, shortened to a width of `most` (in units of the font size), with an ellipsis in place of the rest.
@@ -336,6 +343,7 @@ mod tests {
             spans("*t*_{f} 2").into_iter().map(|span| (span.text, span.italic, span.level)).collect();
         assert_eq!(styles, [("t".to_owned(), true, 0), ("f".to_owned(), false, -1), (" 2".to_owned(), false, 0)]);
         assert_eq!(plain("*W*∗(*t*_{f})"), "W*(tf)");
+        assert_eq!(plain(&literal("dry_granite *2 {a}_{b}")), "dry_granite *2 (a)_(b)");
     }
 
     #[test]

@@ -78,6 +78,12 @@ pub(super) enum Tolerance {
     OfRange(f64),
 }
 
+/// A place, with value and slope there.
+type Node = (f64, [f64; 2]);
+
+/// Distance from a node of vanishing slope, in units of a panel, within which a value changes by rounding alone. Derived: the root of half an ulp.
+const FLAT_LENGTH: f64 = 1.5e-8;
+
 impl ValueRange {
     /// The empty range.
     pub const NONE: ValueRange = ValueRange { low: f64::INFINITY, high: f64::NEG_INFINITY };
@@ -88,22 +94,57 @@ impl ValueRange {
         self.high = self.high.max(value);
     }
 
-    /// Extends the range to the values between two nodes `(u, [value, slope])`; `at(u)` returns value and slope.
+    /// Extends the range to the values between two nodes; `at(u)` returns value and slope.
+    ///
+    /// A slope of the control velocity or of friction that vanishes at a node, as at both ends of a protocol, has no sign, and an extremum may be
+    /// arbitrarily near: the interval is divided ever closer to that node.
+    pub fn add_interval(&mut self, first: Node, last: Node, tolerance: Tolerance, at: &impl Fn(f64) -> [f64; 2]) {
+        self.add(first.1[0]);
+        self.add(last.1[0]);
+        let allowed = self.allowed(tolerance);
+        let is_divided = matches!(tolerance, Tolerance::OfRange(_)) && (last.1[0] - first.1[0]).abs() > allowed;
+        let is_flat = |(_, [_, slope]): Node| is_divided && slope.abs() * (last.0 - first.0) <= allowed;
+        match (is_flat(first), is_flat(last)) {
+            (false, false) => self.add_between(first, last, tolerance, at),
+            (true, false) => self.add_towards(last, first, tolerance, at),
+            (false, true) => self.add_towards(first, last, tolerance, at),
+            (true, true) => {
+                let u = 0.5 * (first.0 + last.0);
+                let middle = (u, at(u));
+                self.add(middle.1[0]);
+                self.add_towards(middle, first, tolerance, at);
+                self.add_towards(middle, last, tolerance, at);
+            }
+        }
+    }
+
+    /// Extends the range to the values between two nodes, of which the slope vanishes at the second.
+    fn add_towards(&mut self, from: Node, flat: Node, tolerance: Tolerance, at: &impl Fn(f64) -> [f64; 2]) {
+        let mut before = from;
+        let is_apart = |(u, _): Node| (flat.0 - u).abs() > FLAT_LENGTH;
+        while is_apart(before) && (before.1[0] - flat.1[0]).abs() > self.allowed(tolerance) {
+            let u = 0.25 * before.0 + 0.75 * flat.0;
+            let next = (u, at(u));
+            self.add(next.1[0]);
+            self.add_between(before, next, tolerance, at);
+            before = next;
+        }
+        self.add_between(before, flat, tolerance, at);
+    }
+
+    /// Extends the range to the extrema between two nodes, in either order.
     ///
     /// There is an extremum where the slopes differ in sign. Where they do not, there may be two: the slope is checked
     /// where that of the cubic through both nodes bends back most.
-    pub fn add_interval(
+    fn add_between(
         &mut self,
-        first: (f64, [f64; 2]),
-        last: (f64, [f64; 2]),
+        (u_0, [value_0, slope_0]): Node,
+        (u_1, [value_1, slope_1]): Node,
         tolerance: Tolerance,
-        at: impl Fn(f64) -> [f64; 2],
+        at: &impl Fn(f64) -> [f64; 2],
     ) {
-        let ((u_0, [value_0, slope_0]), (u_1, [value_1, slope_1])) = (first, last);
-        self.add(value_0);
-        self.add(value_1);
         if (slope_0 > 0.0) != (slope_1 > 0.0) {
-            return self.add_extremum([u_0, u_1], [slope_0, slope_1], tolerance, &at);
+            return self.add_extremum([u_0, u_1], [slope_0, slope_1], tolerance, at);
         }
         let length = u_1 - u_0;
         let unit = if matches!(tolerance, Tolerance::OfValue(_)) { value_0 } else { 1.0 };
@@ -112,14 +153,14 @@ impl ValueRange {
         let bend = 2.0 * (3.0 * mean - 2.0 * slope_0 - slope_1);
         let s = bend / (6.0 * (2.0 * mean - slope_0 - slope_1));
         let opposite = slope_0 + 0.5 * bend * s;
-        let matters = opposite.abs() * length > self.allowed(tolerance);
+        let matters = (opposite * length).abs() > self.allowed(tolerance);
         if s > 0.0 && s < 1.0 && matters && (opposite > 0.0) != (slope_0 > 0.0) {
             let middle = u_0 + s * length;
             let [value, slope] = at(middle);
             self.add(value);
             if (slope > 0.0) != (slope_0 > 0.0) {
-                self.add_extremum([u_0, middle], [slope_0, slope], tolerance, &at);
-                self.add_extremum([middle, u_1], [slope, slope_1], tolerance, &at);
+                self.add_extremum([u_0, middle], [slope_0, slope], tolerance, at);
+                self.add_extremum([middle, u_1], [slope, slope_1], tolerance, at);
             }
         }
     }
@@ -130,7 +171,7 @@ impl ValueRange {
             let [value, slope] = at(u);
             self.add(value);
             // The extremum differs from this value by less than the slope over the interval.
-            if slope.abs() * (ends[1] - ends[0]) <= self.allowed(tolerance) { 0.0 } else { slope }
+            if (slope * (ends[1] - ends[0])).abs() <= self.allowed(tolerance) { 0.0 } else { slope }
         };
         crossing(slope, ends, slopes, 0.0);
     }
@@ -139,7 +180,37 @@ impl ValueRange {
     fn allowed(&self, tolerance: Tolerance) -> f64 {
         match tolerance {
             Tolerance::OfValue(rtol) => 0.1 * rtol,
-            Tolerance::OfRange(rtol) => 0.1 * rtol * self.high.abs().max(self.low.abs()),
+            Tolerance::OfRange(rtol) => 0.1 * rtol * self.magnitude(),
+        }
+    }
+
+    /// Greatest absolute value in the range.
+    pub fn magnitude(&self) -> f64 {
+        self.high.abs().max(self.low.abs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Extrema of functions with known ones.
+
+    use super::{Tolerance, ValueRange};
+
+    #[test]
+    fn an_extremum_beside_a_node_of_vanishing_slope_is_found() {
+        // A rise to 1 whose last part overshoots: 1 + d s^2 - s^3 (1 + s) at the distance s from the end, as v_c of a stiff spring.
+        for d in [1e-1, 1e-2, 1e-3] {
+            let at = |u: f64| {
+                let s = 1.0 - u;
+                [1.0 + d * s * s - s * s * s * (1.0 + s), -2.0 * d * s + 3.0 * s * s + 4.0 * s * s * s]
+            };
+            let node = |u: f64| (u, at(u));
+            let mut range = ValueRange::NONE;
+            range.add_interval(node(0.3), node(1.0), Tolerance::OfRange(1e-13), &at);
+            // Where 4 s^2 + 3 s = 2 d.
+            let s = 4.0 * d / (3.0 + (9.0 + 32.0 * d).sqrt());
+            assert!((range.high - at(1.0 - s)[0]).abs() < 1e-13, "{d}: {range:?}");
+            assert_eq!(range.low, at(0.3)[0]);
         }
     }
 }

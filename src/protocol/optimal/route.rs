@@ -226,7 +226,7 @@ impl Route {
                     let pace = arc.pieces.time(before.0, after.0) / (after.0 - before.0);
                     let along = |place, [value, slope]: [f64; 2]| (place, [value, pace * slope]);
                     let (first, last) = (along(before.0, before.1), along(after.0, after.1));
-                    extent.add_interval(first, last, tolerance, |place| along(place, moment_at(place)).1);
+                    extent.add_interval(first, last, tolerance, &|place| along(place, moment_at(place)).1);
                 }
                 before = after;
             }

@@ -46,7 +46,7 @@ impl ResolvedPanel {
         for ((u, theta, rate), theta_second) in self.nodes().zip(theta_seconds) {
             let (x, z) = self.x_and_z(u);
             let after = along(u, &Jet { v: curve.derivatives(x, z), theta, rate }, theta_second);
-            range.add_interval(before, after, tolerance, between);
+            range.add_interval(before, after, tolerance, &between);
             before = after;
         }
     }

@@ -242,7 +242,7 @@ impl ResolvedPanel {
         let mut before = (0.0, at(0.0));
         for ((u, friction), slope) in radau().u.into_iter().zip(friction).zip(slope) {
             let after = (u, [friction, slope]);
-            totals.friction.add_interval(before, after, Tolerance::OfRange(rtol), at);
+            totals.friction.add_interval(before, after, Tolerance::OfRange(rtol), &at);
             before = after;
         }
     }

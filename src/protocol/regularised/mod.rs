@@ -96,10 +96,15 @@ fn assemble(
     let mut stats = solved.stats;
     let (Some(optimum), Some(route)) = (solved.value, route) else { return none(solved.status, stats) };
     let mut gather = |rtol| Assembly::new(slider, rtol).gather(&route, (v_i, v_f), (delta_t, t_f), &mut stats);
-    // A small excess is the difference of two works, which need more digits.
-    let gathered = gather(rtol).and_then(|sum| match SPARE_ACCURACY * sum.excess.abs() / sum.replaced {
-        fraction if fraction < 1.0 => gather((fraction * rtol).max(TIGHTEST_RTOL)),
-        _ => Ok(sum),
+    let gathered = gather(rtol).and_then(|rough| {
+        // A small excess is the difference of two works, and small control velocities are those of larger terms: both need more digits.
+        let mut finer = |fraction: f64| match SPARE_ACCURACY * fraction {
+            spare if spare < 1.0 => gather((spare * rtol).max(TIGHTEST_RTOL)).map(Some),
+            _ => Ok(None),
+        };
+        let control = finer(rough.control.magnitude() / rough.v.high)?.map_or(rough.control, |fine| fine.control);
+        let sum = finer(rough.excess.abs() / rough.replaced)?.unwrap_or(rough);
+        Ok(Assembly { control, ..sum })
     });
     let mut sum = match gathered {
         Ok(sum) => sum,

@@ -14,6 +14,9 @@ const MOST_NODES: u32 = 4_000_000;
 
 const FINE: f64 = 1e-12;
 
+/// Shortest legal piece.
+const MIN_DURATION: f64 = 1e-20;
+
 /// What rounding may leave of the velocity where the exponent of a piece is steep.
 const STEEP: f64 = 2e-10;
 
@@ -32,7 +35,7 @@ fn draw(random: &mut Random) -> Point {
     let slider = random.slider(transition.law, transition.v_f);
     let t_f = random.duration(&transition, bounded);
     let Transition { v_i, v_f, .. } = transition;
-    let delta_t = t_f * random.between(1e-6, 0.6);
+    let delta_t = (t_f * random.between(1e-6, 0.6)).max(MIN_DURATION);
     Point { slider, velocities: (v_i, v_f), t_f, delta_t, bounded, rtol: random.rtol() }
 }
 
@@ -88,8 +91,10 @@ fn accurate(point: &Point, rough: &Regularised, row: &mut Row) {
     let Some(fine) = found.value else { return row.fact("exists at 1e-12", false) };
     let noise = 2.0 * (rtol + FINE);
     row.agree("work to rtol", rough.work, fine.work, noise);
-    // Rounding of the works of the pieces, and of their times.
-    let rounding = 4.0 * f64::EPSILON * (1.0 + fine.gap.abs() * t_f / delta_t);
+    // Rounding of the works of the pieces, whose friction may change sign, of their times, and of the exponents of their velocities.
+    let exponent = (fine.v_max / fine.v_min).ln();
+    let friction = 1.0 + slider.law.b * exponent;
+    let rounding = f64::EPSILON * (4.0 + exponent) * (friction + fine.gap.abs() * t_f / delta_t);
     row.at_most("gap to rtol", (rough.gap - fine.gap).abs(), noise * fine.gap.abs() + rounding);
     // The ends of a piece have slopes of the order of 1/a in time, and curvatures of their square.
     let slope = delta_t / slider.law.a;
