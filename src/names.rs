@@ -42,11 +42,7 @@ pub fn shown(text: &str, most: usize) -> Cow<'_, str> {
 }
 
 /// Names of our quantities and columns in other tools, in lower case.
-const SYNONYMS: [(&str, &[&str]); 21] = [
-    ("threads", &["jobs", "j", "cores", "workers", "cpus", "processes", "parallel"]),
-    ("out", &["output", "output_dir", "outdir", "dir", "dest", "to"]),
-    ("quiet", &["silent"]),
-    ("rows", &["limit", "lines"]),
+const SYNONYMS: [(&str, &[&str]); 10] = [
     ("where", &["filter", "condition"]),
     ("rtol", &["tol", "tolerance", "accuracy", "precision"]),
     ("l", &["d_c", "dc", "d_rs", "length"]),
@@ -57,13 +53,6 @@ const SYNONYMS: [(&str, &[&str]); 21] = [
     ("k", &["stiffness"]),
     ("geomspace", &["logspace"]),
     ("m", &["mass"]),
-    ("plan", &["check", "validate", "lint", "dry_run", "estimate"]),
-    ("head", &["show", "view", "cat", "ls", "list", "preview"]),
-    ("summary", &["info", "describe", "stats", "inspect"]),
-    ("query", &["export", "sql", "select", "convert"]),
-    ("plot", &["draw", "figure", "picture"]),
-    ("init", &["new", "create", "start"]),
-    ("run", &["sweep", "solve", "compute", "resume"]),
 ];
 
 /// Greatest length of a name whose first letter must be correct, in characters. Chosen: `min` and `bin` are one letter away from `sin`.
@@ -119,10 +108,8 @@ mod tests {
 
     #[test]
     fn words_of_others_lead_to_ours() {
-        assert_eq!(nearest("jobs", ["out", "threads", "shard"]), Some("threads"));
         assert_eq!(nearest("D_c", ["mu_0", "l", "v_0", "normal_stress"]), Some("l"));
         assert_eq!(nearest("sigma", ["mu_0", "l", "v_0", "normal_stress"]), Some("normal_stress"));
-        assert_eq!(nearest("jobs", ["out"]), None);
     }
 
     #[test]

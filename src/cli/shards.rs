@@ -7,7 +7,7 @@ use std::process::Command;
 
 use clap::ValueEnum;
 
-use super::{Failure, load, say, to_file, whole, words, wrong};
+use super::{Failure, load, say, to_file, whole, within, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -31,13 +31,8 @@ pub struct Arguments {
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = whole::<u64>(1, 1024))]
     cpus: u64,
     /// Least predicted work of a task, in minutes
-    #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = minutes)]
+    #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = within(0.0, 1e9))]
     minutes: f64,
-}
-
-fn minutes(text: &str) -> Result<f64, String> {
-    let minutes = text.parse::<f64>().ok().filter(|minutes| minutes.is_finite() && *minutes >= 0.0);
-    minutes.ok_or_else(|| format!("expected a number of minutes, 0 or more, found `{text}`"))
 }
 
 /// A scheduler with array jobs.
@@ -118,7 +113,6 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let out = absolute(&arguments.out)?;
     let folder = Folder::new(&out, &sweep.name);
     let script = engine.script(folder.path());
-    check_path(engine, &out)?;
     fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
     let program = std::env::current_exe()
         .map_err(|error| Failure::failed(format!("cannot find the path of the running program: {error}")))?;
@@ -167,19 +161,6 @@ fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String
     let tasks = bounds.iter().map(|(most, _)| *most).fold(arguments.shards, u64::min);
     let reason = bounds.into_iter().find(|(most, _)| *most == tasks && tasks < arguments.shards);
     (tasks, reason.map(|(_, reason)| reason))
-}
-
-/// Checks that the scheduler can write logs below a folder: Slurm removes backslashes from the path of a log, and two of them disable its
-/// patterns.
-fn check_path(engine: Engine, out: &Path) -> Result<(), Failure> {
-    if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
-        return Err(wrong(format!(
-            "{}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
-             elsewhere with --out DIR",
-            out.display()
-        )));
-    }
-    Ok(())
 }
 
 fn refused(path: &Path, action: &str, error: &std::io::Error) -> Failure {
