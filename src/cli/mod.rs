@@ -210,7 +210,7 @@ fn parent(path: &Path) -> &Path {
 /// Refuses to replace a part or the manifest of a dataset.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = fs::canonicalize(parent(&real)).unwrap_or_default();
+    let folder = fs::canonicalize(parent(&real)).unwrap_or_else(|_| parent(&real).to_owned());
     let is_manifest = real.file_name().is_some_and(|name| name == MANIFEST) && kind::is_dataset(&folder);
     if is_manifest || folder.parent().is_some_and(kind::is_dataset) {
         let what = "a file of a dataset, which only `slipsweep run` writes";

@@ -121,12 +121,10 @@ impl Arguments {
             Some(table) => vec![table.clone()],
             None => source.tables(),
         };
-        if tables.len() > 1
-            && let Some(flag) = self.given(("--out FILE", place.is_file))
-        {
+        if tables.len() > 1 && place.is_file {
             let tables = tables.join(", ");
             return Err(wrong(format!(
-                "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
+                "--out FILE is for one table\n  found: {tables}\n  help: name one of them with --table"
             )));
         }
         let (mut damage, mut pictures) = (None, 0);
@@ -153,13 +151,6 @@ impl Arguments {
             None if pictures == 0 => Err(wrong(format!("{}: no table has a picture", path.display()))),
             None => Ok(()),
         }
-    }
-
-    /// The first given argument among `first` and the arguments that apply to one table.
-    fn given(&self, first: (&'static str, bool)) -> Option<&'static str> {
-        let [x, y, color] = [&self.x, &self.y, &self.color].map(Option::is_some);
-        let all = [first, ("--where", !self.conditions.is_empty()), ("--x", x), ("--y", y), ("--color", color)];
-        all.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
     }
 
     fn request(&self) -> Result<Request, Failure> {

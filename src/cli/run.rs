@@ -166,9 +166,9 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
         return Ok(());
     }
     // If the upper bound does not fit, a sample estimates the size.
-    let sizes = sweep::sizes(sweep).map_err(Failure::failed)?;
-    let bytes = (sizes.iter().zip(&plan.tables).zip(missing))
-        .map(|((size, table), missing)| size * missing as f64 / table.parts as f64)
+    let estimates = sweep::estimate(sweep, folder.path()).map_err(Failure::failed)?;
+    let bytes = (estimates.tables.iter().zip(&plan.tables).zip(missing))
+        .map(|((estimate, table), missing)| estimate.bytes * missing as f64 / table.parts as f64)
         .sum::<f64>();
     if bytes < free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
 }

@@ -97,7 +97,7 @@ impl Sweep {
             let help = match error.kind() {
                 io::ErrorKind::NotFound => path_hint(path, ".toml"),
                 io::ErrorKind::InvalidData => "save it as UTF-8 in the editor".to_owned(),
-                _ => "check its permissions".to_owned(),
+                _ => "name a readable file".to_owned(),
             };
             SpecError::new("", format!("cannot read: {error}"), "a readable TOML file", help).of(path)
         })?;

@@ -23,8 +23,8 @@ pub struct SpecError {
     pub help: Box<str>,
 }
 
-/// Greatest length of a key or finding in a message, in characters. Chosen: twice the 1000 of the longest expression.
-const MAX_SHOWN_CHARS: usize = 2500;
+/// Greatest length of a key or finding in a message, in characters. Chosen: more than the 1000 of the longest expression.
+const MAX_SHOWN_CHARS: usize = 1200;
 
 impl SpecError {
     /// A fault at `key`, without a line yet.

@@ -30,7 +30,7 @@ pub(crate) use direct::available_bytes;
 pub use direct::{Direct, Given, RowsError};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
-pub use estimate::{Estimate, Estimates, estimate, sizes};
+pub use estimate::{Estimate, Estimates, estimate};
 pub use laws::friction;
 pub use plan::Plan;
 pub use schema::schema;

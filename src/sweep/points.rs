@@ -300,6 +300,10 @@ fn header<'a>(place: &str, names: impl Iterator<Item = &'a str>) -> Result<Vec<C
             let found = format!("{place}: column `{name}` without a name, or with that of another column");
             return Err(fault(found, "each column once, with a name", "rename it, or remove it"));
         }
+        if quantity.is_none() && name.contains([';', '\t', '\r']) {
+            let found = format!("{place}: columns or lines that end with ; or a tab, in `{name}`");
+            return Err(fault(found, "columns that end with commas, lines with newlines", "save it as such CSV"));
+        }
         if quantity.is_none() && taken.iter().any(|taken| taken.eq_ignore_ascii_case(name)) {
             let found = format!("{place}: the label `{name}` has the name of a column of a table");
             return Err(fault(found, "a name that no table has", &format!("name it `{name}_label`")));
