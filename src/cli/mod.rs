@@ -282,7 +282,7 @@ fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, S
 fn within(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| {
         let number = text.parse().ok().filter(|number| (least..=most).contains(number));
-        number.ok_or_else(|| format!("expected a number from {least} to {most:?}"))
+        number.ok_or_else(|| format!("expected a number from {least} to {most}"))
     }
 }
 

@@ -97,8 +97,7 @@ impl Sweep {
         };
         let [here, there] = [value(self, &here), value(other, &there)];
         if here == there {
-            return ["the files and values that it names", "other contents of the same files or long values"]
-                .map(str::to_owned);
+            return [format!("the values of {key}"), format!("other values of {key}")];
         }
         let line = read::line(&self.text, key).filter(|_| !here.starts_with("no "));
         [line.map_or(here.clone(), |line| format!("{here} (line {line})")), there]
