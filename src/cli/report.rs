@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::summary::SummaryBlock;
 use super::watch::waiting;
-use super::{Failure, dataset, keep_datasets, plan, say, summary, words, write_file};
+use super::{Failure, dataset, keep_datasets, plan, refused, say, summary, words, write_file};
 use crate::dataset::TableSurvey;
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
@@ -31,6 +31,12 @@ pub struct Arguments {
 pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    // A device or a named pipe has no ending.
+    if !matches!(ending.as_deref(), Some("html" | "htm")) && (path.is_file() || !path.exists()) {
+        let found = format!("--out {}: the page is HTML", path.display());
+        return Err(refused(found, "a name that ends in .html", "leave out --out, or change the ending"));
+    }
     keep_datasets(&path)?;
     let mut page = Page::new(&format!("Dataset {}", manifest.name));
     // The description by the user comes first.

@@ -87,8 +87,10 @@ impl Sweep {
         let new = here.iter().filter(|fact| !there.contains(fact));
         let lost = there.iter().filter(|fact| !here.contains(fact));
         // An axis is more specific than the order of all axes.
-        let key =
-            new.chain(lost).map(|(key, _)| key.as_str()).min_by_key(|key| key.ends_with("axes")).unwrap_or("spec");
+        let keys = new.chain(lost).map(|(key, _)| key.as_str());
+        let Some(key) = keys.min_by_key(|key| key.ends_with("axes")) else {
+            return ["the files that it names", "other contents of the same files"].map(str::to_owned);
+        };
         let value = |sweep: &Sweep, facts: &[(String, String)]| {
             let fact =
                 facts.iter().find(|(known, _)| known == key && !key.contains("axes.")).map(|(_, value)| value.clone());

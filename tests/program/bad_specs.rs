@@ -191,7 +191,7 @@ fn wrong_arguments() {
     }
     for (given, meant) in [
         (&["run", "x.toml", "--thread", "2"][..], "'--threads'"),
-        (&["rnu", "x.toml"], "'run'"),
+        (&["sumary", "results/x"], "'summary'"),
         (&["trace", "optimum"], "'optimal'"),
         (&["tables", "stabilty"], "`stability`"),
         (&["man", "sumary"], "`summary`"),

@@ -186,7 +186,8 @@ fn other_points_in_the_same_file_are_another_spec() {
     fs::write(&points, "t_f\n0.03\n").expect("is writable");
     let reported = refusal(&Sweep::load(&path).expect("is legal"), folder.path());
     assert!(
-        reported.contains("\n  in the spec: the values of axes.t_f\n  in the dataset: other values of axes.t_f\n"),
+        reported
+            .contains("\n  in the spec: the files that it names\n  in the dataset: other contents of the same files\n"),
         "{reported}"
     );
 }
