@@ -501,8 +501,7 @@ impl Arguments {
             }
             let flags = ["--from", "--disturb", "--unbounded", "--v-ceiling", "--tau-ceiling", "--law"];
             refused.extend(flags.map(|flag| (flag, "regularised friction".to_owned())));
-        }
-        if !self.is_ageing() {
+        } else if !self.is_ageing() {
             let law = format!("the law `{}`", self.law.unwrap_or_default().name());
             if matches!(name, "optimal" | "best_cubic") && !self.v_ceiling.is_some_and(f64::is_finite) {
                 let why = "without one, faster is always better";
