@@ -356,8 +356,9 @@ fn request(
         let is_missing = |axis: &&Quantity| !axis.is_tacit() && block.scale(**axis).is_none();
         let missing: Vec<&str> = written.axes().iter().filter(is_missing).map(|axis| axis.name()).collect();
         if !missing.is_empty() {
-            let found = format!("needs `{}`, which {prefix}axes does not have", missing.join("`, `"));
-            let help = format!("add `{} = ...`, or remove the table", missing.join(" = ...`, `"));
+            let place = if prefix.is_empty() { "the spec" } else { prefix.trim_end_matches('.') };
+            let found = format!("needs {}, which {place} does not have", missing.join(", "));
+            let help = format!("add {} = ... to its axes, or remove the table", missing.join(" = ..., "));
             return refuse(key, found, expected_axes(written.axes()), help);
         }
     }

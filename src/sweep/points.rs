@@ -56,7 +56,7 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
             }
             Cells::Label { .. } => {
                 let error = unknown("points".to_owned(), "axis", &name, &Quantity::ALL.map(Quantity::name));
-                let expected = format!("{}; or a label, a column of text", error.expected);
+                let expected = format!("{}; or a label, a column of text or of numbers in quotes", error.expected);
                 let found = format!("{}: {}", path.display(), error.found);
                 return Err(SpecError { found: found.into(), expected: expected.into(), ..error });
             }
@@ -282,7 +282,7 @@ fn numbers(column: &ArrayRef) -> Option<Vec<f64>> {
 fn unreadable(path: &Path, error: &dyn Display) -> SpecError {
     let found = format!("cannot read {}: {error}", path.display());
     let expected = "a readable CSV file in UTF-8, or a Parquet file, uncompressed or with Snappy or Zstandard";
-    fault(found, expected, "check the path; it is relative to the spec")
+    fault(found, expected, "check the path, which is relative to the spec, and the format of the file")
 }
 
 fn fault(found: String, expected: &str, help: &str) -> SpecError {

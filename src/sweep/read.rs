@@ -7,6 +7,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{SpecError, unknown};
 use super::spec::Spec;
+use crate::grid::Quantity;
 
 impl Spec {
     /// Reads a spec from TOML.
@@ -16,7 +17,7 @@ impl Spec {
     /// The syntax error, an unknown or missing key, or a value of the wrong type.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
         let document = DeTable::parse(text).map_err(|error| {
-            let help = "put text in \"quotes\", close brackets, and separate values by commas";
+            let help = "put text in \"quotes\", close brackets, separate values by commas, and write each key once";
             let fault =
                 SpecError::new("", format!("not TOML: {}", error.message()), "key = value, [table] or # comment", help);
             SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }
@@ -40,10 +41,15 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
     }
     if message.starts_with("unknown field ") {
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-        return unknown(key, "key", names[0], &names[1..]);
+        let fault = unknown(key, "key", names[0], &names[1..]);
+        return match Quantity::from_name(names[0]) {
+            Some(_) => SpecError { help: "axes go below the line [axes], or [block.axes] in a block".into(), ..fault },
+            None => fault,
+        };
     }
     let expected = match message.split_once(", expected ").map_or(message, |(_, expected)| expected) {
         "f64" => "a number",
+        "floating-point number overflowed" => "a number below 1e308",
         "i64" => "a whole number",
         "a boolean" => "true or false",
         "a sequence" => "a list",
@@ -82,6 +88,7 @@ pub fn line(text: &str, key: &str) -> Option<usize> {
     let document = DeTable::parse(text).ok()?;
     Some(line_of(text, find(document.get_ref(), key)?.start))
 }
+
 /// The text of the value of `key`; `None` if it is missing or a table.
 pub fn value(text: &str, key: &str) -> Option<String> {
     let document = DeTable::parse(text).ok()?;
