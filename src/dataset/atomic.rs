@@ -121,14 +121,12 @@ pub fn sweep(folder: &Path, now: SystemTime) {
         if !is_temporary(&name) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        let abandoned = if name.ends_with(&ours) {
-            match File::open(entry.path()).map(|file| file.try_lock()) {
-                Ok(Ok(())) => true,
-                Ok(Err(TryLockError::WouldBlock)) => false,
-                _ => is_old(&entry, now),
-            }
-        } else {
-            is_old(&entry, now)
+        // The lock lasts until the file is removed, so that no process that is creating it loses it.
+        let file = File::open(entry.path());
+        let abandoned = match file.as_ref().map(File::try_lock) {
+            Ok(Ok(())) if name.ends_with(&ours) => true,
+            Ok(Err(TryLockError::WouldBlock)) => false,
+            _ => is_old(&entry, now),
         };
         if abandoned {
             let _ = fs::remove_file(entry.path());
@@ -167,19 +165,11 @@ pub fn time(folder: &Path, bytes: usize) -> Result<Duration, DatasetError> {
 /// # Errors
 ///
 /// A folder that cannot be created.
-pub fn create_folder(folder: &Path) -> io::Result<()> {
-    if folder.is_dir() {
-        return Ok(());
-    }
-    let above = folder_of(folder);
-    if above != Path::new(".") {
-        create_folder(above)?;
-    }
-    match fs::create_dir(folder) {
-        // Another process was faster.
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists && folder.is_dir() => Ok(()),
-        created => created.and_then(|()| sync_folder(above)),
-    }
+pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
+    let missing: Vec<&Path> = folder.ancestors().take_while(|folder| !folder.is_dir()).collect();
+    let created = fs::create_dir_all(folder);
+    let synced = created.and_then(|()| missing.iter().try_for_each(|folder| sync_folder(folder_of(folder))));
+    synced.map_err(|error| failed(folder, "create the folder", error))
 }
 
 #[cfg(unix)]

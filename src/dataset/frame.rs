@@ -6,15 +6,14 @@ use arrow_array::RecordBatchReader;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::statistics::Statistics;
 
 pub use super::cell::Cells;
 
 use super::cell::Cell;
 use super::folder::DatasetError;
-use super::guard::guarded;
-use super::metadata_limits::{self, coded};
+use super::guard::{coded, sound};
 use crate::file;
 
 /// Rows decoded in one batch. Chosen: a batch fits the cache of a core.
@@ -90,19 +89,19 @@ pub type Facts = Vec<(String, String)>;
 ///
 /// A file that cannot be read.
 pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
-    let file = file::open(path).map_err(|error| wrong(path, error))?;
-    let metadata = metadata_limits::footer(&file).map_err(|error| wrong(path, error))?;
-    let footer = metadata.file_metadata();
-    let schema = guarded(|| parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()))
-        .ok_or_else(|| wrong(path, "its schema is damaged"))?
-        .map_err(|error| wrong(path, error))?;
+    let read = || -> Result<_, ParquetError> {
+        let metadata = ParquetMetaDataReader::new().parse_and_finish(&file::open(path)?)?;
+        let footer = metadata.file_metadata();
+        let schema = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())?;
+        Ok((schema, footer.key_value_metadata().cloned().unwrap_or_default()))
+    };
+    let (schema, entries) = sound(read).map_err(|error| wrong(path, error))?;
     let heading = |field: &arrow_schema::FieldRef| {
         let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
         let is_number = field.data_type().is_numeric();
         Heading { name: field.name().clone(), unit: entry("unit"), doc: entry("description"), is_number }
     };
-    let entries = footer.key_value_metadata().into_iter().flatten();
-    let entries = entries.filter_map(|entry| Some((entry.key.clone(), entry.value.clone()?))).collect();
+    let entries = entries.into_iter().filter_map(|entry| Some((entry.key, entry.value?))).collect();
     Ok((schema.fields().iter().map(heading).collect(), entries))
 }
 
@@ -223,7 +222,5 @@ fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, Fr
         }
         Ok(Frame { height, columns })
     };
-    guarded(read)
-        .unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())))
-        .map_err(|error| wrong(path, error))
+    sound(read).map_err(|error| wrong(path, error))
 }
