@@ -1,5 +1,6 @@
 //! Columns of a table, read part by part, so that memory does not grow with the table.
 
+use std::fs::File;
 use std::path::Path;
 
 use arrow_array::RecordBatchReader;
@@ -111,7 +112,7 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
 ///
 /// A file that cannot be read, or a column that it does not have.
 pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
-    open(path, Some(names), Rows::All)
+    open(path, Some(names), |all| all)
 }
 
 /// Decides from the least and the greatest number of each column whether to read a row group; a column without numbers has none.
@@ -123,7 +124,11 @@ pub type Keep<'a> = &'a dyn Fn(&dyn Fn(&str) -> Option<(f64, f64)>) -> bool;
 ///
 /// A file that cannot be read, or a column that it does not have.
 pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, FrameError> {
-    open(path, Some(names), Rows::Of(keep))
+    open(path, Some(names), |all| {
+        let groups = all.metadata().row_groups().iter().enumerate();
+        let kept = groups.filter(|(_, group)| keep(&|name| range(group, name))).map(|(place, _)| place).collect();
+        all.with_row_groups(kept)
+    })
 }
 
 /// All columns of a Parquet file.
@@ -132,7 +137,7 @@ pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, 
 ///
 /// A file that cannot be read.
 pub fn read_all(path: &Path) -> Result<Frame, FrameError> {
-    open(path, None, Rows::All)
+    open(path, None, |all| all)
 }
 
 /// The least and the greatest number of a column of a row group.
@@ -149,7 +154,7 @@ fn range(group: &RowGroupMetaData, name: &str) -> Option<(f64, f64)> {
 /// # Errors
 /// If the file cannot be read, or has no such row.
 pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
-    let frame = open(path, None, Rows::One(row))?;
+    let frame = open(path, None, |all| all.with_offset(row).with_limit(1))?;
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
@@ -158,41 +163,21 @@ pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
 /// # Errors
 /// If the file cannot be read.
 pub fn first(path: &Path, count: usize) -> Result<Frame, FrameError> {
-    open(path, None, Rows::First(count))
+    open(path, None, |all| all.with_limit(count))
 }
 
-/// The selection of rows of a file.
-enum Rows<'a> {
-    All,
-    /// So many from the first on.
-    First(usize),
-    /// Some row groups.
-    Of(Keep<'a>),
-    /// The row with this number.
-    One(usize),
-}
+/// A reader of some rows of a file, or all.
+type Builder = ParquetRecordBatchReaderBuilder<File>;
 
-/// Reads some or all columns of the selected rows.
-fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, FrameError> {
+/// Reads some or all columns of the rows that `select` selects.
+fn open(path: &Path, names: Option<&[&str]>, select: impl FnOnce(Builder) -> Builder) -> Result<Frame, FrameError> {
     let read = || -> Result<Frame, ParquetError> {
         let file = file::open(path)?;
         let metadata = coded(&file)?;
-        let mut builder =
-            ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE);
+        let mut builder = select(Builder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE));
         if let Some(names) = names {
             let mask = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
             builder = builder.with_projection(mask);
-        }
-        match rows {
-            Rows::All => {}
-            Rows::First(count) => builder = builder.with_limit(count),
-            Rows::One(row) => builder = builder.with_offset(row).with_limit(1),
-            Rows::Of(keep) => {
-                let groups = builder.metadata().row_groups().iter().enumerate();
-                let kept =
-                    groups.filter(|(_, group)| keep(&|name| range(group, name))).map(|(place, _)| place).collect();
-                builder = builder.with_row_groups(kept);
-            }
         }
         let reader = builder.build()?;
         let fields = reader.schema();
