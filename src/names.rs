@@ -2,6 +2,9 @@
 
 use std::borrow::Cow;
 
+/// Greatest length of a name with a suggestion, in bytes. Chosen: three times the longest valid name.
+const MAX_NAME_BYTES: usize = 64;
+
 /// `value` to nine significant digits.
 pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -67,7 +70,12 @@ const SYNONYMS: [(&str, &[&str]); 21] = [
 const MAX_SHORT_CHARS: usize = 4;
 
 /// The most likely intended name among `known`, all in lower case: a synonym of `name`, or a similar name.
+///
+/// `None` for names of more than [`MAX_NAME_BYTES`] bytes, since a comparison takes memory and time in proportion to the product of both lengths.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if name.len() > MAX_NAME_BYTES {
+        return None;
+    }
     let name = name.to_lowercase();
     let ours = SYNONYMS.iter().find(|(_, theirs)| theirs.contains(&name.as_str())).map(|(ours, _)| *ours);
     let distance = |candidate: &str| {
@@ -118,8 +126,9 @@ mod tests {
     }
 
     #[test]
-    fn long_and_foreign_text_is_shortened_and_escaped() {
+    fn regress_a_name_of_megabytes_is_neither_compared_nor_shown() {
         let name = "é".repeat(1 << 20);
+        assert_eq!(nearest(&name, ["linspace"]), None);
         assert_eq!(shown(&name, 64), format!("{}...", "é".repeat(64)));
         assert_eq!(shown("linspace", 8), "linspace");
         assert_eq!(shown("\u{1b}[2J\n", 8), "\\u{1b}[2J\n");

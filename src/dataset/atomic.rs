@@ -30,12 +30,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
 ///
 /// A file that cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, DatasetError> {
-    let write = || {
-        match filled(path, |file| file.write_all(bytes))?.persist_noclobber(path) {
-            Ok(_) => sync_folder(folder_of(path)).map(|()| true),
-            Err(_) if path.exists() => Ok(false),
-            Err(error) => Err(error.error),
-        }
+    let write = || match filled(path, |file| file.write_all(bytes))?.persist_noclobber(path) {
+        Ok(_) => sync_folder(folder_of(path)).map(|()| true),
+        Err(_) if path.exists() => Ok(false),
+        Err(error) => Err(error.error),
     };
     write().map_err(|error| failed(path, "write", error))
 }

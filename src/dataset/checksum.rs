@@ -108,7 +108,8 @@ fn page_header(file: &impl ChunkReader, page: Range<u64>) -> Result<Bytes> {
     let bytes = file.get_bytes(page.start, length.min(MAX_HEADER_BYTES) as usize)?;
     // Every field is a byte and an integer in groups of seven bits. The third one is the size of the content, with the sign in the lowest bit.
     let content = bytes.split_inclusive(|byte| *byte < 0x80).nth(5);
-    let content = content.map(|digits| digits.iter().rev().fold(0, |size, digit| size << 7 | u64::from(digit & 0x7f)) >> 1);
+    let content =
+        content.map(|digits| digits.iter().rev().fold(0, |size, digit| size << 7 | u64::from(digit & 0x7f)) >> 1);
     let header = content.and_then(|content| length.checked_sub(content)).filter(|header| *header <= bytes.len() as u64);
     header.map(|header| bytes.slice(..header as usize)).ok_or_else(|| damaged("page header"))
 }

@@ -29,9 +29,11 @@ pub use folder::{DatasetError, Folder};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
 pub use frame::{FrameError, ReadError, Row};
-pub(crate) use guard::{coded, guarded, sound};
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
+#[cfg(feature = "query")]
+pub(crate) use guard::sound;
+pub(crate) use guard::{coded, guarded};
 pub use layout::Layout;
 pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};

@@ -177,7 +177,8 @@ fn lock(folder: &Path, company: Concurrency) -> Result<Option<Lock>, DatasetErro
     };
     match locked {
         Err(TryLockError::WouldBlock) => {
-            let process = holders(&file).first().map_or(String::new(), |holder| format!(" (process {})", holder.process));
+            let process =
+                holders(&file).first().map_or(String::new(), |holder| format!(" (process {})", holder.process));
             Err(DatasetError::Busy { folder: folder.display().to_string(), process })
         }
         _ => Ok(Some(Lock(file))),

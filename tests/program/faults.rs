@@ -88,15 +88,15 @@ fn damaged_points_are_read_or_refused() {
     let mut next = numbers();
     let read = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("is writable");
-        Sweep::parse(spec, folder.path()).map_err(|error| error.to_string())
+        Sweep::parse(spec, folder.path()).err().map(|error| error.to_string())
     };
     let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/points");
     for sample in fs::read_dir(samples).expect("is there") {
         let sample = sample.expect("is readable").path();
         let good = fs::read(&sample).expect("is there");
         for length in (0..good.len()).step_by(7) {
-            let reported = read(&good[..length]).expect_err("is cut");
-            assert!(reported.contains("cannot read points.parquet"), "{}, {length}: {reported}", sample.display());
+            let reported = read(&good[..length]).expect("is cut");
+            assert!(reported.contains("cannot read "), "{}, {length}: {reported}", sample.display());
         }
         for _ in 0..300 {
             let mut bad = good.clone();
@@ -104,7 +104,7 @@ fn damaged_points_are_read_or_refused() {
             for byte in bad.iter_mut().skip(at).take(length) {
                 *byte = if length == 1 { *byte ^ 1 << next(8) } else { next(256) as u8 };
             }
-            if let Err(reported) = read(&bad) {
+            if let Some(reported) = read(&bad) {
                 assert!(reported.len() < 4096, "{}: {reported}", sample.display());
             }
         }
