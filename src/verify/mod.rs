@@ -1,18 +1,13 @@
 //! Audit of a dataset: a sample of its rows is checked by the equations that their protocols obey, or solved by a second route.
 
-mod arcsinh;
-mod best_cubic;
 mod checked_row;
-mod compliant;
 mod crossover;
 mod feedback;
-mod gap;
 mod hopf;
 mod motion;
 mod open_loop;
 mod optimal;
 mod reduced;
-mod regularised;
 mod relaxed;
 mod route;
 mod sample;
@@ -116,14 +111,14 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             fault,
         };
         let check = |row: &mut CheckedRow<'_>| match table.name.as_str() {
-            "gap" => gap::check(row),
+            "gap" => shortcut::gap(row),
             "optimal" => optimal::check(row),
             "feedback" => feedback::check(row),
             "crossover" => crossover::check(row),
-            "best_cubic" => best_cubic::check(row),
-            "shortcut" => shortcut::check(row),
-            "compliant" => compliant::check(row),
-            "regularised" => regularised::check(row),
+            "best_cubic" => shortcut::best_cubic(row),
+            "shortcut" => shortcut::shortcut(row),
+            "compliant" => shortcut::compliant(row),
+            "regularised" => shortcut::regularised(row),
             "step_response" => step_response::check(row),
             "stability" => stability::check(row),
             _ if is_reduced => reduced::check(row, &units, &spec),

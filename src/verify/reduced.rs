@@ -5,7 +5,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::{Checked, CheckedRow, Context, gap, scale};
+use super::{Checked, CheckedRow, Context, scale, shortcut};
 use crate::dataset::{Cell, Row};
 use crate::grid::{Quantity, Scale};
 use crate::model::Units;
@@ -92,9 +92,9 @@ pub fn check(written: &mut CheckedRow<'_>, units: &Units, spec: &Spec) -> Checke
         for (row, place) in rows.zip(0..) {
             reduced.see(written, row, buffer.status[place], || cells(&buffer, place));
             if solved.contains(&row) {
-                let mut shortcut = shortcut(&sweep, row, &cells(&buffer, place), buffer.status[place]);
-                scale(&mut shortcut, request.table, units, relative);
-                written.extend(CheckedRow::new(&shortcut, context, gap::check));
+                let mut member = member(&sweep, row, &cells(&buffer, place), buffer.status[place]);
+                scale(&mut member, request.table, units, relative);
+                written.extend(CheckedRow::new(&member, context, shortcut::gap));
             }
         }
     }
@@ -137,7 +137,7 @@ fn landscape(written: &CheckedRow<'_>, spec: &Spec) -> Option<Sweep> {
 }
 
 /// Row number `row` of the landscape as a row of `gap`.
-fn shortcut(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
+fn member(sweep: &Sweep, row: u64, cells: &[f64], status: Status) -> Row {
     let request = &sweep.requests[0];
     let point = request.row_index.point(row);
     let axes = request.table.axes().iter().map(|axis| (axis.name().to_owned(), Cell::Number(point[*axis])));
