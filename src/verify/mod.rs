@@ -150,7 +150,8 @@ fn relative(folder: &Folder, table: &ManifestTable) -> [bool; 2] {
     let headings = parts.iter().find_map(|&part| frame::headings(&folder.part(&table.name, part)).ok());
     let headings = headings.map(|(headings, _)| headings).unwrap_or_default();
     // In any system of units.
-    ["alpha_2", "alpha_3"].map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
+    ["alpha_2", "alpha_3"]
+        .map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
 }
 
 impl Audit {

@@ -94,7 +94,9 @@ pub fn check(written: &mut CheckedRow<'_>, table: &Table, units: &Units, spec: &
                 let alpha = COEFFICIENTS[usize::from(column == "alpha_3")];
                 written.compare_relative(column, point.as_ref().map(|point| point[alpha]), 1.0);
             }
-            (_, Some(percentage)) if table.name() == "gap_quantiles" => compare_quantile(written, column, percentage, &gaps),
+            (_, Some(percentage)) if table.name() == "gap_quantiles" => {
+                compare_quantile(written, column, percentage, &gaps)
+            }
             _ if place.is_some() => {
                 written.compare(column, place.and_then(|place| least.as_ref().map(|(_, cells)| cells[place])));
             }
