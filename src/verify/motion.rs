@@ -291,7 +291,7 @@ pub fn lowest(f: &dyn Fn(f64) -> f64, (low, high): (f64, f64)) -> f64 {
 }
 
 /// Position and value of the minimum in an interval that contains one.
-pub fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
+fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     let fraction = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..80 {
         let (left, right) = (high - fraction * (high - low), low + fraction * (high - low));

@@ -31,14 +31,14 @@ pub struct Optimum {
 const CEILING_RTOL: f64 = 1e-14;
 
 /// Times that an interval of a motion may be halved. Chosen: a 64th of an interval resolves the layers at the ends of arcs.
-pub const MAX_SPLITS: u32 = 6;
+const MAX_SPLITS: u32 = 6;
 
 /// Logarithm of the growth of an error on the ceilings, beyond which `C` does not determine the rest of the path. Derived: `e^12` roundings are 2e-11, a
 /// fraction of the default `rtol`.
 const MAX_GROWTH: f64 = 12.0;
 
 /// Relative error of a duration that is ignored under ceilings. Chosen: that of the motions.
-pub const TIME_NOISE: f64 = 1e-12;
+const TIME_NOISE: f64 = 1e-12;
 
 /// Time on a bound, relative to `t_f`, below which rounding decides whether the protocol is ever on it. Chosen: ten times [`TIME_NOISE`].
 const MIN_TIME_RTOL: f64 = 1e-11;
