@@ -1,7 +1,7 @@
 //! Opens plain files that a user names. Named pipes, which wait for a writer, and devices, which may never end, are refused.
 
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Opens the file in `path` for reading.
@@ -11,10 +11,20 @@ use std::path::Path;
 /// [`io::ErrorKind::InvalidInput`] for anything but a plain file, and errors of the operating system.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
-    let found = match kind {
-        kind if kind.is_file() => return File::open(path),
-        kind if kind.is_dir() => "a folder, not a file",
-        _ => "a device or a named pipe, not a file",
-    };
+    if kind.is_file() {
+        return File::open(path);
+    }
+    let found = if kind.is_dir() { "a folder, not a file" } else { "a device or a named pipe, not a file" };
     Err(io::Error::new(io::ErrorKind::InvalidInput, found))
+}
+
+/// The bytes of the file in `path`.
+///
+/// # Errors
+///
+/// Those of [`open`].
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
 }

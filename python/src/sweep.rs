@@ -18,11 +18,9 @@ use crate::threads::{self, interruptible, stopper};
 #[pyclass(frozen, module = "slipsweep._core")]
 pub struct Sweep(Arc<sweep::Sweep>);
 
-/// A fault of a spec that no file holds: its lines are not those of anything that the caller wrote.
-fn without_lines(mut fault: SpecError) -> SpecError {
-    fault.line = None;
-    fault.others.iter_mut().for_each(|other| other.line = None);
-    fault
+/// A fault of a spec that no file holds: its line is not one of anything that the caller wrote.
+fn without_line(fault: SpecError) -> SpecError {
+    SpecError { line: None, ..fault }
 }
 
 #[pymethods]
@@ -38,7 +36,7 @@ impl Sweep {
     #[staticmethod]
     fn parse(py: Python<'_>, text: String, folder: PathBuf) -> PyResult<Sweep> {
         let sweep = interruptible(py, || (), move || sweep::Sweep::parse(&text, &folder))?;
-        Ok(Sweep(Arc::new(sweep.map_err(|fault| error::spec(&without_lines(fault)))?)))
+        Ok(Sweep(Arc::new(sweep.map_err(|fault| error::spec(&without_line(fault)))?)))
     }
 
     #[getter]

@@ -1,14 +1,12 @@
 //! `slipsweep head DATASET [TABLE]`: the first rows of a table, with units.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use console::Term;
 
 #[cfg(feature = "query")]
 use super::query::unreadable;
-use super::{Failure, kind, no_table, say, summary, whole, words};
-use crate::protocol::Status;
+use super::{Failure, kind, no_table, note, note_rebuilt, say, summary, whole, words};
 #[cfg(feature = "query")]
 use crate::query::{Source, Tables};
 use crate::table;
@@ -46,50 +44,56 @@ struct Head {
 /// A path without tables, or a part that cannot be read.
 pub fn head(arguments: &Arguments) -> Result<(), Failure> {
     kind::expect_rows(&arguments.dataset)?;
-    super::note_at(&arguments.dataset);
+    note_rebuilt(&arguments.dataset);
     let width = Term::stdout().size_checked().map(|(_, columns)| columns.into());
-    let (heads, failure) = heads(arguments)?;
-    let texts: Vec<String> = heads.into_iter().map(|head| head.text(arguments, width)).collect();
+    let (mut texts, mut failure) = (Vec::new(), None);
+    for head in heads(arguments)? {
+        match head {
+            Ok(head) => texts.push(head.text(arguments, width)),
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
     if !texts.is_empty() {
         say(&texts.join("\n"))?;
     }
     failure.map_or(Ok(()), Err)
 }
 
-/// The first rows of one table or of all, and the first failure to read one.
-type Heads = (Vec<Head>, Option<Failure>);
-
 /// The first rows of tables of a dataset or of a file.
 #[cfg(feature = "query")]
-fn heads(arguments: &Arguments) -> Result<Heads, Failure> {
+fn heads(arguments: &Arguments) -> Result<Vec<Result<Head, Failure>>, Failure> {
     let Tables { sources, absent } = Tables::open(&arguments.dataset)?;
     let names = sources.iter().map(|source| &source.name).chain(absent.iter().map(|table| &table.name));
     let wanted = chosen(arguments, &names.map(String::as_str).collect::<Vec<_>>())?;
     let first = |source: &Source| {
         let mut rows = Vec::new();
-        source
-            .first(arguments.rows)?
-            .rows(|piece| {
-                rows.extend(piece.iter().map(|row| row.iter().map(summary::shown).collect()));
-                Ok(())
-            })
-            .map_err(|error| unreadable(&arguments.dataset, &error))?;
+        let first = source.first(arguments.rows)?.rows(|piece| {
+            rows.extend(piece.iter().map(|row| row.iter().map(summary::shown).collect()));
+            Ok(())
+        });
+        first.map_err(|error| unreadable(&arguments.dataset, &error))?;
         let lines = words::headed(source.columns.clone(), source.units.clone(), rows);
         Ok(Head { name: source.name.clone(), lines, rows: source.rows, missing: source.missing })
     };
-    Ok(readable(wanted.into_iter().filter_map(|place| match sources.get(place) {
-        Some(source) => Some(first(source)),
-        None => {
-            let table = &absent[place - sources.len()];
-            let is_noted = !table.is_damaged() && arguments.notes_empty(&table.name);
-            (!is_noted).then(|| Err(table.error().into()))
-        }
-    })))
+    Ok(wanted
+        .into_iter()
+        .filter_map(|place| match sources.get(place) {
+            Some(source) => Some(first(source)),
+            None => {
+                let table = &absent[place - sources.len()];
+                if arguments.table.is_none() && !table.is_damaged() {
+                    note(format!("`{}` has no parts yet; `slipsweep run` computes them", table.name));
+                    return None;
+                }
+                Some(Err(table.error().into()))
+            }
+        })
+        .collect())
 }
 
-/// The first rows of tables of a dataset.
+/// The first rows of the tables of a dataset, each from its first part.
 #[cfg(not(feature = "query"))]
-fn heads(arguments: &Arguments) -> Result<Heads, Failure> {
+fn heads(arguments: &Arguments) -> Result<Vec<Result<Head, Failure>>, Failure> {
     use crate::dataset::frame;
 
     let (folder, manifest) = super::dataset(&arguments.dataset)?;
@@ -98,39 +102,17 @@ fn heads(arguments: &Arguments) -> Result<Heads, Failure> {
         let table = &manifest.tables[place];
         let (paths, missing) = folder.verified(&manifest, table).map_err(Failure::failed)?;
         let Some(first) = paths.first() else {
-            let help = "compute them with `slipsweep run`";
-            let error = || Failure::failed(format!("`{}` has no parts yet\n  help: {help}", table.name));
-            return if arguments.notes_empty(&table.name) { Ok(None) } else { Err(error()) };
+            note(format!("`{}` has no parts yet; `slipsweep run` computes them", table.name));
+            return Ok(None);
         };
         let headings = frame::headings(first).map_err(Failure::failed)?.0;
-        let mut rows: Vec<Vec<String>> = Vec::new();
-        for path in &paths {
-            let wanted = arguments.rows as usize - rows.len();
-            if wanted == 0 {
-                break;
-            }
-            let frame = frame::first(path, wanted).map_err(Failure::failed)?;
-            rows.extend(
-                (0..frame.height).map(|row| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect()),
-            );
-        }
+        let frame = frame::first(first, arguments.rows as usize).map_err(Failure::failed)?;
+        let cells = |row: usize| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect();
         let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
-        let lines = words::headed(names, units, rows);
+        let lines = words::headed(names, units, (0..frame.height).map(cells).collect());
         Ok(Some(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing }))
     };
-    Ok(readable(chosen(arguments, &names)?.into_iter().filter_map(|place| first(place).transpose())))
-}
-
-/// The tables that can be read, and the first failure.
-fn readable(heads: impl Iterator<Item = Result<Head, Failure>>) -> Heads {
-    let (mut found, mut failure) = (Vec::new(), None);
-    for head in heads {
-        match head {
-            Ok(head) => found.push(head),
-            Err(error) => failure = failure.or(Some(error)),
-        }
-    }
-    (found, failure)
+    Ok(chosen(arguments, &names)?.into_iter().filter_map(|place| first(place).transpose()).collect())
 }
 
 /// The places of the requested tables among `names`.
@@ -138,16 +120,6 @@ fn chosen(arguments: &Arguments, names: &[&str]) -> Result<Vec<usize>, Failure> 
     let Some(name) = &arguments.table else { return Ok((0..names.len()).collect()) };
     let place = names.iter().position(|known| known == name);
     place.map(|place| vec![place]).ok_or_else(|| no_table(&format!("{}: ", arguments.dataset.display()), name, names))
-}
-
-impl Arguments {
-    /// Prints a note on a table without parts, unless it was requested alone.
-    fn notes_empty(&self, table: &str) -> bool {
-        if self.table.is_none() {
-            let _ = writeln!(io::stderr(), "note: `{table}` has no parts yet; `slipsweep run` computes them");
-        }
-        self.table.is_none()
-    }
 }
 
 /// Replaces the middle columns of `lines` by `…` if they are wider than `width` characters, and returns their number.
@@ -175,15 +147,6 @@ fn hide_middle(lines: &mut [Vec<String>], width: usize) -> usize {
 }
 
 impl Head {
-    /// Whether the rows are all without a protocol, and others follow.
-    fn are_empty(&self) -> bool {
-        let Some((names, lines)) = self.lines.split_first() else { return false };
-        let Some(status) = names.iter().position(|name| name == table::STATUS) else { return false };
-        let mut words = lines.iter().filter_map(|line| line.get(status)).filter(|word| !word.is_empty());
-        let shown = words.clone().count() as u64;
-        shown > 0 && self.rows.is_some_and(|rows| rows > shown) && words.all(|word| word == Status::Infeasible.name())
-    }
-
     /// A line on the table, then names, units and rows, which a terminal shows in `width` characters.
     fn text(mut self, arguments: &Arguments, width: Option<usize>) -> String {
         let mut text = self.name.clone();
@@ -195,19 +158,12 @@ impl Head {
             }
         }
         text.push('\n');
-        let are_empty = self.are_empty();
         let hidden = width.map_or(0, |width| hide_middle(&mut self.lines, width.saturating_sub(2)));
         text.push_str(&words::aligned(&self.lines, 2));
         let (path, name) = (arguments.dataset.display(), &self.name);
         if hidden > 0 {
             let columns = words::things(hidden as u64, "more column");
             text.push_str(&format!("  {columns}: slipsweep head {path} {name} | less -S\n"));
-        }
-        if are_empty {
-            text.push_str(&format!(
-                "  the first rows with numbers: slipsweep query {path} \"SELECT * FROM {name} WHERE status = 'ok' LIMIT {}\"\n",
-                arguments.rows
-            ));
         }
         text
     }

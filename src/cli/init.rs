@@ -69,11 +69,6 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
         let place = if name == given.to_string() { String::new() } else { format!("`{given}`: ") };
         refused(format!("{place}{}", error.found), error.expected, error.help)
     })?;
-    if !(folder.as_os_str().is_empty() || folder.is_dir()) {
-        let found = format!("`{given}`: there is no folder `{}`", folder.display());
-        let expected = format!("a name such as {name}, or one in an existing folder");
-        return Err(refused(found, expected, format!("slipsweep init {name}")));
-    }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
     let path = folder.join(format!("{name}.toml"));
     let has = |path: &Path, text: &str| file::open(path).and_then(io::read_to_string).is_ok_and(|found| found == text);

@@ -30,23 +30,22 @@ use std::fmt::Display;
 use std::fs::{self, OpenOptions};
 use std::io::{self, BufWriter, StdoutLock, Write};
 use std::panic;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 use self::watch::waiting;
 use crate::dataset::{Folder, Manifest, atomic};
-use crate::names::{hint, nearest};
+use crate::names::hint;
 #[cfg(feature = "query")]
 use crate::query::QueryError;
 use crate::sweep::{SpecError, Sweep, schema};
 
-use kind::Kind;
+use kind::{Kind, MANIFEST};
 
 /// Exit code if the spec or the arguments are wrong.
 const EXIT_REQUEST: u8 = 1;
@@ -180,7 +179,6 @@ pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
-            let error = suggested(error);
             let printed = error.print();
             if error.use_stderr() {
                 // A lost terminal is ignored.
@@ -200,21 +198,8 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 
 /// The failure for a file that cannot be written.
 fn cannot_write(path: &Path, error: &io::Error) -> Failure {
-    let help = match error.kind() {
-        io::ErrorKind::NotFound => "make its folder first, or name an existing one",
-        io::ErrorKind::StorageFull => "free some space, or write to another disk",
-        io::ErrorKind::FileTooLarge => "raise the limit of file sizes, `ulimit -f`, or write fewer rows",
-        _ => "choose an existing folder with write permission",
-    };
+    let help = "name a file in an existing folder with write permission and free space";
     Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))
-}
-
-/// The resolved path of a file, and its folder.
-fn real(out: &Path) -> (PathBuf, PathBuf) {
-    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = parent(&real);
-    let folder = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-    (real, folder)
 }
 
 /// The folder of a path; of a bare name, the current one.
@@ -224,18 +209,12 @@ fn parent(path: &Path) -> &Path {
 
 /// Refuses to replace a part or the manifest of a dataset.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
-    let (real, folder) = real(out);
-    // Parts are protected even if the manifest is lost.
-    let is_dataset =
-        |folder: &Path| folder.join("manifest.json").exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)));
-    let name = real.file_name().unwrap_or_default().to_string_lossy();
-    let is_manifest = name == "manifest.json" && is_dataset(&folder);
-    if is_manifest || folder.parent().is_some_and(is_dataset) {
-        let what = if is_manifest { "the manifest of a dataset" } else { "in a table of a dataset" };
-        return Err(wrong(format!(
-            "{}: this is {what}, which only `slipsweep run` writes\n  help: write to another file",
-            out.display()
-        )));
+    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    let folder = fs::canonicalize(parent(&real)).unwrap_or_else(|_| parent(&real).to_owned());
+    let is_manifest = real.file_name().is_some_and(|name| name == MANIFEST) && kind::is_dataset(&folder);
+    if is_manifest || folder.parent().is_some_and(kind::is_dataset) {
+        let what = "a file of a dataset, which only `slipsweep run` writes";
+        return Err(wrong(format!("{}: {what}\n  help: write to another file", out.display())));
     }
     Ok(())
 }
@@ -278,46 +257,6 @@ fn ended(done: Result<(), Failure>) -> u8 {
     }
 }
 
-/// Options of other programs that ours does not need, and what it does instead.
-const NEEDLESS_OPTIONS: [(&str, &str); 5] = [
-    ("resume", "`slipsweep run` resumes by itself: it computes only what is missing"),
-    ("continue", "`slipsweep run` resumes by itself: it computes only what is missing"),
-    ("force", "a dataset is never replaced by another one: change `name` in the spec, or remove its folder"),
-    ("overwrite", "a dataset is never replaced by another one: change `name` in the spec, or remove its folder"),
-    ("dry_run", "`slipsweep plan` checks a spec and estimates its run"),
-];
-
-/// `error` with a suggestion of the intended option or command.
-fn suggested(mut error: clap::Error) -> clap::Error {
-    let (invalid, suggestion) = match error.kind() {
-        ErrorKind::UnknownArgument => (ContextKind::InvalidArg, ContextKind::SuggestedArg),
-        ErrorKind::InvalidSubcommand => (ContextKind::InvalidSubcommand, ContextKind::SuggestedSubcommand),
-        _ => return error,
-    };
-    let Some(ContextValue::String(given)) = error.get(invalid) else { return error };
-    // In the spelling of columns.
-    let given = given.trim_start_matches('-').replace('-', "_");
-    let program = Arguments::command();
-    if let Some((_, tip)) = NEEDLESS_OPTIONS.iter().find(|(option, _)| *option == given) {
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![(*tip).into()]));
-        error.remove(ContextKind::SuggestedArg);
-        error.remove(ContextKind::Usage);
-        return error;
-    }
-    let meant = if invalid == ContextKind::InvalidSubcommand {
-        nearest(&given, program.get_subcommands().map(clap::Command::get_name)).map(str::to_owned)
-    } else {
-        let command = env::args().skip(1).find_map(|word| program.find_subcommand(word)).unwrap_or(&program);
-        let options = command.get_arguments().filter_map(|option| option.get_long());
-        let options: Vec<String> = options.map(|option| option.replace('-', "_")).collect();
-        nearest(&given, options.iter().map(String::as_str)).map(|option| format!("--{}", option.replace('_', "-")))
-    };
-    if let Some(meant) = meant {
-        error.insert(suggestion, ContextValue::String(meant));
-    }
-    error
-}
-
 /// Reads and checks the spec in `path`; prints warnings.
 fn load(path: &Path) -> Result<Sweep, Failure> {
     kind::expect_spec(path)?;
@@ -339,6 +278,14 @@ fn whole<T: TryFrom<u64>>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, S
     }
 }
 
+/// A parser of numbers from `least` to `most`.
+fn within(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| (least..=most).contains(number));
+        number.ok_or_else(|| format!("expected a number from {least} to {most}"))
+    }
+}
+
 /// The failure for a wrong request.
 fn wrong(message: impl Display) -> Failure {
     Failure { code: EXIT_REQUEST, message: format!("error: {message}") }
@@ -357,31 +304,26 @@ fn refused(found: impl Display, expected: impl Display, help: impl Display) -> F
 pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
     kind::expect(path, &[Kind::Dataset])?;
     let folder = Folder::at(path);
-    match folder.manifest().map_err(Failure::failed)? {
-        Some(manifest) => {
-            note(&folder, &manifest);
-            Ok((folder, manifest))
-        }
-        // It was removed in the meantime.
-        None => Err(kind::unexpected(path, &[Kind::Dataset])),
-    }
+    // It may have been removed in the meantime.
+    let manifest = folder.manifest().map_err(Failure::failed)?;
+    let manifest = manifest.ok_or_else(|| kind::unexpected(path, &[Kind::Dataset]))?;
+    note_rebuilt(path);
+    Ok((folder, manifest))
 }
 
-/// Prints a note on standard error if the manifest was reconstructed from the parts.
-fn note(folder: &Folder, manifest: &Manifest) {
-    if let Some(why) = &manifest.rebuilt {
-        let path = folder.manifest_path();
-        let text = "rebuilt from the footers of the parts; `slipsweep run` rewrites it";
-        let _ = writeln!(io::stderr(), "note: {} is {why}; {text}", path.display());
-    }
+/// Prints a note if the manifest of the dataset in `path` was reconstructed from the parts.
+fn note_rebuilt(path: &Path) {
+    let Ok(Some(Manifest { rebuilt: Some(why), .. })) = Folder::at(path).manifest() else { return };
+    let manifest = path.join(MANIFEST);
+    note(format!(
+        "{} is {why}; rebuilt from the footers of the parts; `slipsweep run` rewrites it",
+        manifest.display()
+    ));
 }
 
-/// Prints this note for the dataset in `path`, if any.
-fn note_at(path: &Path) {
-    let folder = Folder::at(path);
-    if let (true, Ok(Some(manifest))) = (path.is_dir(), folder.manifest()) {
-        note(&folder, &manifest);
-    }
+/// Prints a note. One that cannot be printed is no failure.
+fn note(text: impl Display) {
+    let _ = writeln!(io::stderr(), "note: {text}");
 }
 
 /// Reports only the first panic of the process: the engine provokes others while it searches for the faulty row. Panics of a reader of damaged

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::waiting;
-use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, refused, say, write_file, wrong};
+use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, refused, say, within, write_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError, missing_letters};
 use crate::sweep::units_of;
@@ -46,17 +46,11 @@ pub struct Arguments {
     #[arg(long, value_name = "FORMAT", value_enum)]
     format: Option<Format>,
     /// Width in millimetres: 89 for one column of a journal, 183 for two [default: by the number of panels]
-    #[arg(long, value_name = "MM", value_parser = |text: &str| in_range(text, 50.0, 1000.0))]
+    #[arg(long, value_name = "MM", value_parser = within(50.0, 1000.0))]
     width: Option<f64>,
     /// Pixels per inch of a .png
-    #[arg(long, value_name = "N", default_value = "300", value_parser = |text: &str| in_range(text, 20.0, 2400.0))]
+    #[arg(long, value_name = "N", default_value = "300", value_parser = within(20.0, 2400.0))]
     dpi: f64,
-}
-
-/// Parses a number from `least` to `most`.
-fn in_range(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| (least..=most).contains(number));
-    number.ok_or_else(|| format!("expected a number from {least} to {most}"))
 }
 
 impl From<PlotError> for Failure {
@@ -127,18 +121,16 @@ impl Arguments {
             Some(table) => vec![table.clone()],
             None => source.tables(),
         };
-        if tables.len() > 1
-            && let Some(flag) = self.given(("--out FILE", place.is_file))
-        {
+        if tables.len() > 1 && place.is_file {
             let tables = tables.join(", ");
             return Err(wrong(format!(
-                "{flag} is for one table\n  found: {tables}\n  help: name one of them with --table"
+                "--out FILE is for one table\n  found: {tables}\n  help: name one of them with --table"
             )));
         }
         let (mut damage, mut pictures) = (None, 0);
         for table in &tables {
             let drawing = format!("drawing {table}");
-            let figure = match waiting(&*drawing, || source.figure(table, &request)).map_err(Failure::from) {
+            let figure = match waiting(&drawing, || source.figure(table, &request)).map_err(Failure::from) {
                 // A table without a picture does not prevent the pictures of other tables.
                 Err(failure) if tables.len() > 1 && failure.code == EXIT_FAILURE => {
                     damage = damage.or(Some(failure));
@@ -159,13 +151,6 @@ impl Arguments {
             None if pictures == 0 => Err(wrong(format!("{}: no table has a picture", path.display()))),
             None => Ok(()),
         }
-    }
-
-    /// The first given argument among `first` and the arguments that apply to one table.
-    fn given(&self, first: (&'static str, bool)) -> Option<&'static str> {
-        let [x, y, color] = [&self.x, &self.y, &self.color].map(Option::is_some);
-        let all = [first, ("--where", !self.conditions.is_empty()), ("--x", x), ("--y", y), ("--color", color)];
-        all.into_iter().find(|(_, is_given)| *is_given).map(|(flag, _)| flag)
     }
 
     fn request(&self) -> Result<Request, Failure> {

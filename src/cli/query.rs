@@ -10,8 +10,8 @@ use std::mem;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, SystemTime};
 
@@ -19,9 +19,14 @@ use clap::ValueEnum;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
-use super::{Failure, cannot_write, keep_datasets, kind, real, say, stdout, summary, to_file, words, written, wrong};
+use super::{
+    Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, parent, say, stdout, summary, to_file, words,
+    written, wrong,
+};
 use crate::dataset::atomic;
 use crate::query::{self, Answer, AnswerError, Comparisons, Tables};
+#[cfg(target_os = "linux")]
+use crate::sweep::available_bytes;
 
 /// Arguments of `query`.
 #[derive(Debug, clap::Args)]
@@ -177,21 +182,16 @@ fn reason(status: ExitStatus, said: &str) -> String {
 
 /// Removes the temporary files that an ended process left for `out`.
 fn sweep(out: &Path) {
-    atomic::sweep(&real(out).1, SystemTime::now());
+    let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
+    atomic::sweep(parent(&real), SystemTime::now());
 }
 
 /// Answers a query in this process, which ends after its answer, or when the process that started it ends.
 fn inside(arguments: &Arguments) -> Result<(), Failure> {
     let no_thread = |error| cannot_start("a thread", error);
     limit_memory();
-    // The message of the query reports a panic.
-    let panicked: Arc<Mutex<Option<String>>> = Arc::default();
-    let noted = panicked.clone();
-    panic::set_hook(Box::new(move |panic| {
-        if let Ok(mut first) = noted.lock() {
-            first.get_or_insert_with(|| panic.payload_as_str().unwrap_or_default().to_owned());
-        }
-    }));
+    // The failure of the query reports a panic.
+    panic::set_hook(Box::new(|_| ()));
     rayon::ThreadPoolBuilder::new().build_global().map_err(|error| no_thread(io::Error::other(error)))?;
     let watch = || {
         // Returns when the other process ends.
@@ -203,13 +203,8 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
         let work = || panic::catch_unwind(AssertUnwindSafe(|| answer(arguments)));
         let thread = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work).map_err(no_thread)?;
         let done = thread.join().and_then(|done| done);
-        let unsupported = |_| Err(Failure::failed("the query failed: it is not supported\n  help: rewrite the query"));
-        done.unwrap_or_else(unsupported).map_err(|mut failure| {
-            if let Some(panic) = panicked.lock().ok().and_then(|mut first| first.take()) {
-                let line = panic.lines().next().unwrap_or_default();
-                failure.message.push_str(&format!("\n  note: polars failed: {line}"));
-            }
-            failure
+        done.unwrap_or_else(|_| {
+            Err(Failure::failed("the query failed: it is not supported\n  help: rewrite the query"))
         })
     })
 }
@@ -218,14 +213,11 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
 #[cfg(target_os = "linux")]
 fn limit_memory() {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
-    let kilobytes = |text: &str, key: &str| -> Option<u64> {
-        let line = text.lines().find(|line| line.starts_with(key))?;
-        line.split_whitespace().nth(1)?.parse().ok()
-    };
-    let free = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemAvailable:"));
-    let taken = fs::read_to_string("/proc/self/status").ok().and_then(|text| kilobytes(&text, "VmSize:"));
-    let (Some(free), Some(taken)) = (free, taken) else { return };
-    let most = (free + taken) * 1024;
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmSize:"));
+    let taken = line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    let (Some(free), Some(taken)) = (available_bytes(), taken) else { return };
+    let most = free + 1024 * taken;
     let Rlimit { current, maximum } = getrlimit(Resource::As);
     let most = current.map_or(most, |current| current.min(most));
     // Without the limit, the machine ends the process if necessary.
@@ -239,12 +231,12 @@ fn limit_memory() {}
 fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let format = arguments.output.format()?;
     kind::expect_rows(&arguments.dataset)?;
-    super::note_at(&arguments.dataset);
+    note_rebuilt(&arguments.dataset);
     let tables = Tables::open(&arguments.dataset)?;
     let mut answer = tables.query(&arguments.sql)?;
     for source in tables.sources.iter().filter(|source| source.missing > 0) {
         let (missing, all) = (source.missing, source.missing + source.paths.len() as u64);
-        note(&format!(
+        note(format!(
             "`{}` lacks {} of {}, which `slipsweep run` computes",
             source.name,
             words::count(missing),
@@ -252,10 +244,10 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
         ));
     }
     let Comparisons { words, numbers } = mem::take(&mut answer.comparisons);
-    words.iter().for_each(|text| note(text));
+    words.iter().for_each(note);
     let note_empty = |rows| {
         let is_unexplained = rows == 0 && words.is_empty();
-        numbers.iter().filter(|_| is_unexplained).for_each(|text| note(text));
+        numbers.iter().filter(|_| is_unexplained).for_each(note);
     };
     if arguments.output.is_stdout() {
         let mut out = stdout()?;
@@ -276,11 +268,6 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     })?;
     note_empty(rows);
     say(&format!("written to {path}\n"))
-}
-
-/// Prints a note. One that cannot be printed is no failure.
-fn note(text: &str) {
-    let _ = writeln!(io::stderr(), "note: {text}");
 }
 
 /// The failure of a query, or of files that cannot be read to the end.
@@ -306,13 +293,12 @@ pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
 }
 
 fn write(answer: Answer, format: Format, out: &mut dyn Write) -> Result<usize, AnswerError> {
-    let format = match format {
-        Format::Table => return table(answer, out),
-        Format::Csv => query::Format::Csv,
-        Format::Jsonl => query::Format::JsonLines,
-        Format::Parquet => query::Format::Parquet,
-    };
-    answer.write(format, out)
+    match format {
+        Format::Table => table(answer, out),
+        Format::Csv => answer.write(query::Format::Csv, out),
+        Format::Jsonl => answer.write(query::Format::JsonLines, out),
+        Format::Parquet => answer.write(query::Format::Parquet, out),
+    }
 }
 
 /// Writes aligned columns under their names and, if known, their units, and returns the number of rows.

@@ -63,7 +63,7 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
     page.heading("Pictures");
     for table in source.tables() {
         let drawing = format!("drawing {table}");
-        match waiting(&*drawing, || source.figure(&table, &Request::default())) {
+        match waiting(&drawing, || source.figure(&table, &Request::default())) {
             Ok(figure) => {
                 page.picture(&figure.draw(if figure.columns > 1 { PAGE } else { COLUMN }));
                 figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));

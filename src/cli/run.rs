@@ -8,16 +8,15 @@ use std::time::Instant;
 use super::kind::{self, Kind as PathKind};
 use super::plan::too_large;
 use super::shards::quoted;
-use super::watch::{Wait, waiting, watched};
+use super::watch::{waiting, watched};
 use super::{
-    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, parent, refused, say, summary, whole, words, wrong,
+    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, parent, say, summary, whole, words, wrong,
 };
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
-use crate::grid::Quantity;
 use crate::protocol::Status;
-use crate::sweep::{self, Outcome, Plan, Request, RunError, Shard, Sweep, contains_part};
-use crate::table::{Kind, RunStats, Signal};
+use crate::sweep::{self, Outcome, Plan, RunError, Shard, Sweep, contains_part};
+use crate::table::Signal;
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -54,13 +53,8 @@ pub struct Arguments {
 /// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    if let Some(out) = arguments.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
-        let found = format!("--out {}: not a folder", out.display());
-        return Err(refused(found, "a folder, which the run makes if it is missing", "name a folder"));
-    }
     let (sweep, folder) = subject(arguments)?;
-    let planning = Wait { quiet: arguments.quiet, .."planning the sweep".into() };
-    let (plan, parts) = waiting(planning, || {
+    let (plan, parts) = waiting("planning the sweep", || {
         let plan = Plan::new(&sweep);
         let parts = arguments.shard.unwrap_or(Shard::WHOLE).parts(&sweep, &plan).map_err(wrong)?;
         check_room(&sweep, &plan, &parts, &folder)?;
@@ -172,9 +166,9 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
         return Ok(());
     }
     // If the upper bound does not fit, a sample estimates the size.
-    let sizes = sweep::sizes(sweep).map_err(Failure::failed)?;
-    let bytes = (sizes.iter().zip(&plan.tables).zip(missing))
-        .map(|((size, table), missing)| size * missing as f64 / table.parts as f64)
+    let estimates = sweep::estimate(sweep, folder.path()).map_err(Failure::failed)?;
+    let bytes = (estimates.tables.iter().zip(&plan.tables).zip(missing))
+        .map(|((estimate, table), missing)| estimate.bytes * missing as f64 / table.parts as f64)
         .sum::<f64>();
     if bytes < free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
 }
@@ -243,22 +237,11 @@ fn is_passing(error: &io::Error) -> bool {
     /// "Input/output error", for which `io::ErrorKind` has no variant.
     const EIO: i32 = 5;
     use io::ErrorKind as Kind;
-    error.raw_os_error() == Some(EIO)
-        || matches!(
-            error.kind(),
-            Kind::Interrupted
-                | Kind::TimedOut
-                | Kind::WouldBlock
-                | Kind::StaleNetworkFileHandle
-                | Kind::HostUnreachable
-                | Kind::NetworkUnreachable
-                | Kind::NetworkDown
-                | Kind::ConnectionReset
-                | Kind::ConnectionAborted
-                | Kind::ConnectionRefused
-                | Kind::NotConnected
-                | Kind::ResourceBusy
-        )
+    let waits = [Kind::Interrupted, Kind::TimedOut, Kind::WouldBlock, Kind::ResourceBusy, Kind::StaleNetworkFileHandle];
+    let network = [Kind::HostUnreachable, Kind::NetworkUnreachable, Kind::NetworkDown, Kind::NotConnected];
+    let connection = [Kind::ConnectionReset, Kind::ConnectionAborted, Kind::ConnectionRefused];
+    let kinds = waits.iter().chain(&network).chain(&connection);
+    error.raw_os_error() == Some(EIO) || kinds.into_iter().any(|kind| *kind == error.kind())
 }
 
 /// The work of the run, in words.
@@ -267,30 +250,19 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
     if rows == 0 {
         return "nothing to compute: every part exists\n".to_owned();
     }
-    let RunStats {
-        optima,
-        own_optima,
-        landscapes,
-        best,
-        shortcuts,
-        crossovers,
-        simulations,
-        steps,
-        quadratures,
-        nodes,
-    } = outcome.work;
+    let work = outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));
     let mut text = format!("{all} in {}: {rate} rows per second, writing included\n", words::duration(seconds));
     let spent: Vec<String> = [
-        (optima + own_optima, "optimal protocol"),
-        (landscapes, "landscape"),
-        (best, "best shortcut"),
-        (shortcuts, "family shortcut"),
-        (crossovers, "transition"),
-        (simulations, "simulation"),
-        (steps, "step"),
-        (quadratures, "quadrature"),
-        (nodes, "node"),
+        (work.optima + work.own_optima, "optimal protocol"),
+        (work.landscapes, "landscape"),
+        (work.best, "best shortcut"),
+        (work.shortcuts, "family shortcut"),
+        (work.crossovers, "transition"),
+        (work.simulations, "simulation"),
+        (work.steps, "step"),
+        (work.quadratures, "quadrature"),
+        (work.nodes, "node"),
     ]
     .into_iter()
     .filter(|(number, _)| *number > 0)
@@ -305,33 +277,11 @@ fn account(outcome: &Outcome, seconds: f64) -> String {
 /// Commands that inspect the dataset of `sweep` in `path`.
 fn next_commands(sweep: &Sweep, path: &Path) -> String {
     let path = quoted(path);
-    let mut text = "next:\n".to_owned();
-    text.push_str(&format!("  slipsweep head {path}\n  slipsweep plot {path}\n"));
+    let mut text = format!("next:\n  slipsweep head {path}\n  slipsweep plot {path}\n");
     // A build without SQL does not suggest it.
-    let question = sweep.requests.iter().map(question).next().filter(|_| cfg!(feature = "query"));
-    if let Some(question) = question {
-        text.push_str(&format!("  slipsweep query {path} \"{question}\"\n"));
+    if let Some(request) = sweep.requests.first().filter(|_| cfg!(feature = "query")) {
+        let sql = format!("SELECT * FROM {} WHERE status = 'ok' LIMIT 10", request.table.name());
+        text.push_str(&format!("  slipsweep query {path} \"{sql}\"\n"));
     }
     text
-}
-
-/// A useful query for a table: its least gap, work or crossover time, or the number of rows by word, grouped by the slowest axis.
-fn question(request: &Request) -> String {
-    let table = request.table;
-    let columns = || request.projection.indices().iter().map(|&index| &table.columns()[index]);
-    let blocks = request.row_index.blocks();
-    let varies = |axis: &&Quantity| {
-        blocks.iter().any(|block_rows| block_rows.axis(**axis).is_some_and(|(_, axis)| axis.values.len() > 1))
-    };
-    let axis = table.axes().iter().find(varies).map(|axis| axis.name());
-    let least = ["gap", "work", "t_cross"].into_iter().find(|name| columns().any(|column| column.name == *name));
-    let word = columns().find(|column| matches!(column.kind, Kind::Label(_) | Kind::Flag)).map(|column| column.name);
-    let name = table.name();
-    match (least, word, axis) {
-        (Some(least), _, Some(axis)) => {
-            format!("SELECT {axis}, min({least}) FROM {name} WHERE status = 'ok' GROUP BY {axis} ORDER BY {axis}")
-        }
-        (_, Some(word), _) => format!("SELECT {word}, count(*) AS points FROM {name} GROUP BY {word} ORDER BY {word}"),
-        _ => format!("SELECT status, count(*) AS points FROM {name} GROUP BY status ORDER BY status"),
-    }
 }

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use clap::ValueEnum;
 
-use super::{Failure, load, say, to_file, whole, words, wrong};
+use super::{Failure, cannot_write, load, say, to_file, whole, within, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -31,13 +31,8 @@ pub struct Arguments {
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = whole::<u64>(1, 1024))]
     cpus: u64,
     /// Least predicted work of a task, in minutes
-    #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = minutes)]
+    #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = within(0.0, 1e9))]
     minutes: f64,
-}
-
-fn minutes(text: &str) -> Result<f64, String> {
-    let minutes = text.parse::<f64>().ok().filter(|minutes| minutes.is_finite() && *minutes >= 0.0);
-    minutes.ok_or_else(|| format!("expected a number of minutes, 0 or more, found `{text}`"))
 }
 
 /// A scheduler with array jobs.
@@ -118,8 +113,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let out = absolute(&arguments.out)?;
     let folder = Folder::new(&out, &sweep.name);
     let script = engine.script(folder.path());
-    check_path(engine, &out)?;
-    fs::create_dir_all(&arguments.out).map_err(|error| refused(&arguments.out, "create the folder", &error))?;
+    fs::create_dir_all(&arguments.out).map_err(|error| cannot_write(&arguments.out, &error))?;
     let program = std::env::current_exe()
         .map_err(|error| Failure::failed(format!("cannot find the path of the running program: {error}")))?;
     let job = Job {
@@ -134,7 +128,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
         each,
     };
     to_file(&script, |file| file.write_all(job.script(engine).as_bytes()))
-        .map_err(|error| refused(&script, "write", &error))?;
+        .map_err(|error| cannot_write(&script, &error))?;
 
     let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
     let (tasks, cpus) = (words::things(shards, "task"), words::things(arguments.cpus, "processor"));
@@ -169,33 +163,10 @@ fn tasks(arguments: &Arguments, parts: u64, seconds: f64) -> (u64, Option<String
     (tasks, reason.map(|(_, reason)| reason))
 }
 
-/// Checks that the scheduler can write logs below a folder: Slurm removes backslashes from the path of a log, and two of them disable its
-/// patterns.
-fn check_path(engine: Engine, out: &Path) -> Result<(), Failure> {
-    if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
-        return Err(wrong(format!(
-            "{}: Slurm writes no log below a folder whose name has a backslash\n  expected: a path without `\\`\n  help: write \
-             elsewhere with --out DIR",
-            out.display()
-        )));
-    }
-    Ok(())
-}
-
-fn refused(path: &Path, action: &str, error: &std::io::Error) -> Failure {
-    Failure::failed(format!("{}: cannot {action}: {error}\n  help: write elsewhere with --out DIR", path.display()))
-}
-
 /// The absolute path; refused if it is not Unicode, since a script cannot contain it.
 fn absolute(path: &Path) -> Result<PathBuf, Failure> {
-    let wrong = |why: String| wrong(format!("{}: {why}", path.display()));
-    let absolute = std::path::absolute(path).map_err(|error| wrong(error.to_string()))?;
-    match absolute.to_str() {
-        Some(text) if !text.chars().any(char::is_control) => Ok(absolute),
-        _ => Err(wrong(
-            "not a path for a script: it is not UTF-8, or has control characters\n  help: rename it".to_owned(),
-        )),
-    }
+    let absolute = std::path::absolute(path).ok().filter(|path| path.to_str().is_some());
+    absolute.ok_or_else(|| wrong(format!("{}: not a path in UTF-8\n  help: rename it", path.display())))
 }
 
 /// A path, quoted for the shell.

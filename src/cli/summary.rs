@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 
 use super::trace::reason;
-use super::watch::{Wait, waiting};
+use super::watch::waiting;
 use super::{Failure, dataset, say, words};
 use crate::dataset::{
     Cell, CheckDepth, Counts, Folder, MAX_KEPT_ROWS, Manifest, StatisticsRow, Survey, TableStatistics,
@@ -46,16 +46,13 @@ pub fn summary(arguments: &Arguments) -> Result<(), Failure> {
     say(&text)
 }
 
-/// Surveys a dataset, and shows the progress if it takes long.
+/// Surveys a dataset.
 pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey {
-    let looked = AtomicU64::new(0);
-    let there = manifest.tables.iter().map(|table| folder.parts_there(table).len() as u64).sum();
     let doing = match look {
         CheckDepth::Footer => "reading the footers",
         CheckDepth::Whole => "checking existing parts",
     };
-    let wait = Wait { done: Some((&looked, there, "part")), ..doing.into() };
-    waiting(wait, || Survey::new(folder, manifest, look, &looked))
+    waiting(doing, || Survey::new(folder, manifest, look, &AtomicU64::new(0)))
 }
 
 /// The contents of a dataset without damaged parts.
@@ -141,21 +138,6 @@ pub fn infeasibility(dataset: &Path, name: &str, statistics: &TableStatistics) -
     reason.map_or_else(String::new, |reason| format!("  row 0 is infeasible: {reason}\n"))
 }
 
-/// Whether a shortcut costs less than the optimum under a velocity ceiling, which only a faster one can.
-fn is_above_ceiling(statistics: &TableStatistics, row: &StatisticsRow) -> bool {
-    let number = |name: &str| {
-        let place = statistics.columns.iter().position(|(column, _)| column == name)?;
-        match row.cell(place) {
-            Cell::Number(value) => Some(*value),
-            _ => None,
-        }
-    };
-    number("v_ceiling").is_some_and(f64::is_finite) && number("gap").is_some_and(|gap| gap < -MAX_ERROR)
-}
-
-/// Negative gap that may be an error, at most. Derived: a gap is good to `rtol` of 1 + itself, and the loosest `rtol` is 1e-2.
-const MAX_ERROR: f64 = 1e-2;
-
 /// The columns of numbers.
 fn ranges(statistics: &TableStatistics) -> Option<SummaryBlock> {
     let ranges = statistics.ranges.iter().filter(|range| range.count > 0).map(|range| {
@@ -209,14 +191,12 @@ fn listing(statistics: &TableStatistics, rows: &[&StatisticsRow]) -> Vec<Summary
             places.push(place);
         }
     }
-    let line = "a negative gap: the shortcut is faster than v_ceiling, which bounds the optimum alone";
-    let note = rows.iter().any(|row| is_above_ceiling(statistics, row)).then(|| SummaryBlock::Line(4, line.to_owned()));
     let at = (!common.is_empty()).then(|| SummaryBlock::Line(2, format!("at {}", common.join(", "))));
     let names = places.iter().map(|&place| statistics.columns[place].0.clone()).collect();
     let units = places.iter().map(|&place| statistics.columns[place].1.clone()).collect();
     let rows = rows.iter().map(|row| places.iter().map(|&place| shown(row.cell(place))).collect()).collect();
     let table = (!places.is_empty()).then_some(SummaryBlock::Table(4, names, units, rows));
-    at.into_iter().chain(table).chain(note).collect()
+    at.into_iter().chain(table).collect()
 }
 
 /// A cell as text.

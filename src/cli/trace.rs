@@ -159,40 +159,22 @@ struct State {
 
 /// Reads `theta=0.3,t_left=0.015`.
 fn state(text: &str) -> Result<State, String> {
-    let expected = || "expected theta=THETA,t_left=TIME".to_owned();
-    let mut values = [None; 2];
-    for part in text.split(',') {
-        let (name, value) = part.split_once('=').ok_or_else(expected)?;
-        let quantities = [Quantity::Theta, Quantity::TimeLeft];
-        let place = quantities.iter().position(|quantity| quantity.name() == name.trim()).ok_or_else(expected)?;
-        let value = legal(value.trim(), quantities[place].domain()).map_err(|error| format!("{name}: {error}"))?;
-        if values[place].replace(value).is_some() {
-            return Err(format!("{name} occurs twice"));
-        }
-    }
-    let [Some(theta), Some(t_left)] = values else { return Err(expected()) };
-    Ok(State { theta, t_left })
+    let parts = text.strip_prefix("theta=").and_then(|rest| rest.split_once(",t_left="));
+    let (theta, t_left) = parts.ok_or("expected theta=THETA,t_left=TIME")?;
+    let [theta, t_left] = [(theta, Quantity::Theta), (t_left, Quantity::TimeLeft)]
+        .map(|(text, quantity)| legal(text.trim(), quantity.domain()));
+    Ok(State { theta: theta?, t_left: t_left? })
 }
 
 /// Reads `theta=+10% at 0.25`.
 fn disturbance(text: &str) -> Result<Disturbance, String> {
+    let parts = text.strip_prefix("theta=").and_then(|rest| rest.split_once("% at "));
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let numbers = parts.and_then(|(percent, at)| Some((number(percent)?, number(at)?)));
+    let legal = numbers.filter(|&(percent, at)| percent > -100.0 && percent <= 1e6 && at > 0.0 && at < 1.0);
     let expected =
-        || "expected \"theta=+10% at 0.25\": a change in per cent, and a fraction of the duration".to_owned();
-    let (change, at) = text.split_once(" at ").ok_or_else(expected)?;
-    let (name, change) = change.split_once('=').ok_or_else(expected)?;
-    let percent = change.trim().strip_suffix('%').ok_or_else(expected)?.trim();
-    let percent: f64 = percent.parse().map_err(|_| expected())?;
-    let at: f64 = at.trim().parse().map_err(|_| expected())?;
-    if name.trim() != Quantity::Theta.name() {
-        return Err(expected());
-    }
-    if !(percent > -100.0 && percent <= 1e6) {
-        return Err("expected a change above -100 %, at most 1e6 %".to_owned());
-    }
-    if !(at > 0.0 && at < 1.0) {
-        return Err("expected a fraction of the duration between 0 and 1".to_owned());
-    }
-    Ok(Disturbance { change: percent / 100.0, at })
+        "expected \"theta=+10% at 0.25\": a change above -100 %, at a fraction of the duration between 0 and 1";
+    legal.map(|(percent, at)| Disturbance { change: percent / 100.0, at }).ok_or_else(|| expected.to_owned())
 }
 
 /// Reads the name of a protocol, or a path.
@@ -227,8 +209,7 @@ impl TypedValueParser for Subject {
 
 /// Parses the word of an evolution law.
 fn law(text: &str) -> Result<StateLaw, String> {
-    let expected = || format!("expected {}", StateLaw::ALL.map(StateLaw::name).join(", "));
-    StateLaw::find(text).ok_or_else(expected)
+    StateLaw::find(text).ok_or_else(|| format!("expected {}", StateLaw::ALL.map(StateLaw::name).join(", ")))
 }
 
 /// Parses the word of a form of friction.
@@ -245,16 +226,9 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
     }
 }
 
-/// A parser of a quantity. A velocity below 1 is probably in m/s.
+/// A parser of a quantity.
 fn number(quantity: Quantity) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| {
-        let is_small = text.parse().is_ok_and(|value: f64| value > 0.0 && value < 1.0);
-        let help = match quantity.unit(Scale::Model) {
-            "v_0" if is_small => "\n  help: velocities are in units of v_0; divide m/s by v_0",
-            _ => "",
-        };
-        legal(text, quantity.domain()).map_err(|error| format!("{error}{help}"))
-    }
+    move |text| legal(text, quantity.domain())
 }
 
 /// The protocol to trace, from flags or from a row.
@@ -390,14 +364,6 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
 /// Relative accuracy without a row of a table: the default of a spec.
 const DEFAULT_RTOL: f64 = 1e-10;
 
-/// Refuses the first of these flags that is given, since `what`, requested by `other`, does not support it.
-fn refuse_first(flags: &[(bool, &str)], what: &str, other: &str) -> Result<(), Failure> {
-    match flags.iter().find(|(is_given, _)| *is_given) {
-        Some((_, flag)) => Err(wrong(format!("{flag} does not support {what}\n  help: remove {flag} or {other}"))),
-        None => Ok(()),
-    }
-}
-
 /// The flag that gives a quantity.
 fn flag(quantity: Quantity) -> String {
     format!("--{}", quantity.name().replace('_', "-"))
@@ -483,10 +449,7 @@ impl Arguments {
         let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
             if let Some(Origin { table, row, .. }) = request.origin.as_ref().filter(|origin| origin.is_infeasible) {
-                let reason = match table.as_str() {
-                    "step_response" => "the response diverges: without mass the velocity becomes infinite",
-                    _ => "its status is infeasible: the optimum that it is compared with does not exist",
-                };
+                let reason = "its status is infeasible: the response diverges, or its optimum does not exist";
                 return Err(wrong(format!("{}: row {row} of `{table}`: {reason}", self.subject)));
             }
             let trace = of(&*path.motion)?;
@@ -505,17 +468,52 @@ impl Arguments {
         Ok((TracedPath { work: rest.work, ..found.planned }, trace, Some(effects)))
     }
 
+    /// The names of all given options that determine a protocol.
+    fn flags(&self) -> Vec<String> {
+        let numbers =
+            self.given().into_iter().filter(|(quantity, given)| given.is_some() && *quantity != Quantity::Law);
+        let others = [
+            (self.from.is_some(), "--from"),
+            (self.disturb.is_some(), "--disturb"),
+            (!self.is_ageing(), "--law"),
+            (self.friction.is_some(), "--friction"),
+            (self.unbounded, "--unbounded"),
+        ];
+        let others = others.into_iter().filter(|(is_given, _)| *is_given).map(|(_, flag)| flag.to_owned());
+        numbers.map(|(quantity, _)| flag(quantity)).chain(others).collect()
+    }
+
     /// Checks that exactly the parameters of the protocol `name` are given.
     fn check(&self, name: &str) -> Result<(), Failure> {
-        for (is_given, flag) in [(self.from.is_some(), "--from"), (self.disturb.is_some(), "--disturb")] {
-            if is_given && name != "optimal" {
-                return Err(wrong(format!("`{name}` takes no {flag}")));
-            }
+        let friction = self.friction.unwrap_or_default();
+        let mut refused: Vec<(&str, String)> = Vec::new();
+        if name != "optimal" {
+            refused.extend(["--from", "--disturb"].map(|flag| (flag, format!("`{name}`"))));
         }
-        self.check_friction(name)?;
-        self.check_law(name)?;
-        let mut heeded = trace::quantities(if self.from.is_some() { "feedback" } else { name });
-        heeded.retain(|quantity| self.is_ageing() || *quantity != Quantity::FrictionCeiling);
+        if !trace::has_floor(name, friction) {
+            refused.push(("--unbounded", format!("`{name}`")));
+        }
+        if friction == Friction::Regularised {
+            if !trace::has_regularised_friction(name) {
+                return Err(wrong(format!(
+                    "`{name}` does not support regularised friction\n  help: remove --friction"
+                )));
+            }
+            let flags = ["--from", "--disturb", "--unbounded", "--v-ceiling", "--tau-ceiling", "--law"];
+            refused.extend(flags.map(|flag| (flag, "regularised friction".to_owned())));
+        } else if !self.is_ageing() {
+            let law = format!("the law `{}`", self.law.unwrap_or_default().name());
+            if matches!(name, "optimal" | "best_cubic") && !self.v_ceiling.is_some_and(f64::is_finite) {
+                let why = "without one, faster is always better";
+                return Err(wrong(format!("{law} needs --v-ceiling: {why}\n  help: add --v-ceiling 1000")));
+            }
+            refused.extend(["--from", "--disturb", "--unbounded", "--tau-ceiling"].map(|flag| (flag, law.clone())));
+        }
+        let given = self.flags();
+        if let Some((flag, what)) = refused.iter().find(|(flag, _)| given.iter().any(|given| given == flag)) {
+            return Err(wrong(format!("{what} takes no {flag}\n  help: remove {flag}")));
+        }
+        let heeded = trace::quantities(if self.from.is_some() { "feedback" } else { name });
         let (given, missing): (Vec<_>, Vec<_>) = self.given().into_iter().partition(|(_, given)| given.is_some());
         let is_needed = |quantity: &Quantity| heeded.contains(quantity) && quantity.default().is_empty();
         let missing: Vec<Quantity> = missing.into_iter().map(|(quantity, _)| quantity).filter(is_needed).collect();
@@ -523,51 +521,10 @@ impl Arguments {
             let flags: Vec<String> = missing.into_iter().map(flag).collect();
             return Err(wrong(format!("`{name}` needs {}", flags.join(", "))));
         }
-        let unused = given.into_iter().find(|(quantity, _)| !heeded.contains(quantity));
-        let is_unbounded = self.unbounded && !trace::has_floor(name, self.friction.unwrap_or_default());
-        match unused.map(|(quantity, _)| flag(quantity)).or(is_unbounded.then(|| "--unbounded".to_owned())) {
-            Some(flag) => Err(wrong(format!("`{name}` takes no {flag}"))),
+        match given.into_iter().find(|(quantity, _)| !heeded.contains(quantity)) {
+            Some((quantity, _)) => Err(wrong(format!("`{name}` takes no {}", flag(quantity)))),
             None => Ok(()),
         }
-    }
-
-    /// Checks that the protocol `name` and the other parameters support the form of friction.
-    fn check_friction(&self, name: &str) -> Result<(), Failure> {
-        if self.friction.unwrap_or_default() == Friction::Log {
-            return Ok(());
-        }
-        let what = "regularised friction";
-        if !trace::has_regularised_friction(name) {
-            return Err(wrong(format!("`{name}` does not support {what}\n  help: remove --friction")));
-        }
-        self.refuse_starts(what, "--friction")?;
-        let others = [
-            (self.v_ceiling.is_some(), "--v-ceiling"),
-            (self.tau_ceiling.is_some(), "--tau-ceiling"),
-            (!self.is_ageing(), "--law"),
-        ];
-        refuse_first(&others, what, "--friction")
-    }
-
-    /// Checks that the other parameters support the evolution law.
-    fn check_law(&self, name: &str) -> Result<(), Failure> {
-        if self.is_ageing() {
-            return Ok(());
-        }
-        let law = self.law.unwrap_or_default().name();
-        self.refuse_starts(&format!("the law `{law}`"), "--law")?;
-        if matches!(name, "optimal" | "best_cubic") && !self.v_ceiling.is_some_and(f64::is_finite) {
-            let why = "without one, faster is always better";
-            return Err(wrong(format!("the law `{law}` needs --v-ceiling: {why}\n  help: add --v-ceiling 1000")));
-        }
-        Ok(())
-    }
-
-    /// Refuses a start on the way, a disturbance and a missing floor, which `what` does not support.
-    fn refuse_starts(&self, what: &str, flag: &str) -> Result<(), Failure> {
-        let given =
-            [(self.from.is_some(), "--from"), (self.disturb.is_some(), "--disturb"), (self.unbounded, "--unbounded")];
-        refuse_first(&given, what, flag)
     }
 
     /// Whether the law is ageing.
@@ -575,36 +532,14 @@ impl Arguments {
         self.law.unwrap_or_default() == StateLaw::Ageing
     }
 
-    /// The number of the row of a table.
-    fn row_number(&self, source: &RowSource<'_>) -> Result<u64, Failure> {
-        match self.row {
-            Some(row) => Ok(row),
-            None if self.conditions.is_empty() => {
-                let RowSource { path, table, .. } = source;
-                let expected = format!("--row N, from 0 to {}, or --where CONDITION", table.rows.saturating_sub(1));
-                Err(refused(format!("{}: which row of `{}`?", path.display(), table.name), expected, "add --row 0"))
-            }
-            None => source.only_row(&self.conditions),
-        }
-    }
-
     /// The protocol of a row of a table.
     fn row_of(&self, name: &str) -> Result<TraceRequest, Failure> {
-        let is_own = |quantity: Quantity| !(quantity == Quantity::Time && name == "step_response");
-        let given = self.given().into_iter().find(|(quantity, given)| given.is_some() && is_own(*quantity));
-        let words = [(self.friction.is_some(), "--friction"), (self.unbounded, "--unbounded")];
-        let word = words.into_iter().find(|(is_given, _)| *is_given).map(|(_, flag)| flag.to_owned());
-        let given = given.map(|(quantity, _)| flag(quantity)).or(word);
-        if let Some(flag) = given {
-            return Err(wrong(format!(
-                "{flag}: not for a row of a dataset, which has its own parameters\n  help: remove {flag}"
-            )));
+        let is_own = |flag: &&String| !(*flag == "--t-f" && name == "step_response");
+        if let Some(flag) = self.flags().iter().find(is_own) {
+            let why = "not for a row of a dataset, which has its own parameters";
+            return Err(wrong(format!("{flag}: {why}\n  help: remove {flag}")));
         }
         let path = Path::new(&self.subject);
-        if trace::names().any(|(known, _)| known == self.subject) && !path.exists() && Path::new(name).is_dir() {
-            let help = format!("slipsweep trace {name} {} --row {}", self.subject, self.row.unwrap_or(0));
-            return Err(refused(format!("{name}: a dataset after its table"), "the dataset, then the table", help));
-        }
         let (folder, manifest) = dataset(path)?;
         let Some(table) = manifest.tables.iter().find(|table| table.name == name) else {
             let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();
@@ -614,7 +549,10 @@ impl Arguments {
             return Err(wrong(Pathless::Table(name.to_owned())));
         }
         let source = RowSource { path, folder: &folder, manifest: &manifest, table };
-        let number = self.row_number(&source)?;
+        let number = match self.row {
+            Some(row) => row,
+            None => source.only_row(&self.conditions)?,
+        };
         let (part, written) = source.row(number)?;
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
@@ -638,12 +576,12 @@ impl Arguments {
         let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);
         let mut numbers = axes_of(&written, &units);
         numbers.extend(self.t_f.map(|t_f| Named::new("t_f", t_f, units.name("l/v_0"))));
-        let law = written.iter().find_map(|(name, cell)| match cell {
-            Cell::Word(word) if name == Quantity::Law.name() => StateLaw::find(word),
-            _ => None,
-        });
-        let infeasible = Cell::Word(Status::Infeasible.name().to_owned());
-        let is_infeasible = written.iter().any(|(name, cell)| name == table::STATUS && *cell == infeasible);
+        let word = |key: &str| {
+            let cell = written.iter().find(|(name, _)| name == key).map(|(_, cell)| cell);
+            cell.and_then(|cell| if let Cell::Word(word) = cell { Some(word.as_str()) } else { None })
+        };
+        let law = word(Quantity::Law.name()).and_then(StateLaw::find);
+        let is_infeasible = word(table::STATUS) == Some(Status::Infeasible.name());
         Ok(TraceRequest {
             bounded: trace::has_floor(name, friction).then_some(bounded),
             name: protocol_name,
@@ -701,10 +639,13 @@ impl RowSource<'_> {
 
     /// The only row that meets all conditions.
     fn only_row(&self, conditions: &[String]) -> Result<u64, Failure> {
+        let (at, name) = (self.path.display(), &self.table.name);
+        if conditions.is_empty() {
+            let expected = format!("--row N, from 0 to {}, or --where CONDITION", self.table.rows.saturating_sub(1));
+            return Err(refused(format!("{at}: which row of `{name}`?"), expected, "add --row 0"));
+        }
         let all = conditions.iter().map(|text| Condition::all(text)).collect::<Result<Vec<_>, _>>()?.concat();
-        let found = self.rows(&all);
-        let (at, name, conditions) = (self.path.display(), &self.table.name, conditions.join(", "));
-        match found.as_slice() {
+        match self.rows(&all).as_slice() {
             [row] => Ok(*row),
             [] => Err(match FilteredTable::new(self.folder, self.manifest, name, &all) {
                 Err(error) => error.into(),
@@ -713,11 +654,9 @@ impl RowSource<'_> {
             several => {
                 let shown: Vec<String> = several.iter().take(MAX_NAMED_ROWS).map(u64::to_string).collect();
                 let more = if several.len() > MAX_NAMED_ROWS { " and more" } else { "" };
-                let what = format!("{at}: several rows of `{name}` meet --where {conditions:?}");
+                let what = format!("{at}: several rows of `{name}` meet --where {:?}", conditions.join(", "));
                 let found = format!("{what}\n  found: rows {}{more}", shown.join(", "));
-                let axes = self.differing_axes(several)?.join(", ");
-                let more = if axes.is_empty() { String::new() } else { format!(", or a condition on {axes}") };
-                Err(refused(found, "one row", format!("--row {}{more}", several[0])))
+                Err(refused(found, "one row", format!("--row {}, or a further condition", several[0])))
             }
         }
     }
@@ -738,14 +677,6 @@ impl RowSource<'_> {
             }
         }
         found
-    }
-
-    /// The axes in which rows differ.
-    fn differing_axes(&self, numbers: &[u64]) -> Result<Vec<String>, Failure> {
-        let rows: Vec<Row> = numbers.iter().map(|row| Ok(self.row(*row)?.1)).collect::<Result<_, Failure>>()?;
-        let varies = |place: usize| rows.iter().any(|row| row.get(place) != rows[0].get(place));
-        let names = rows[0].iter().enumerate().filter(|(place, _)| varies(*place)).map(|(_, (name, _))| name);
-        Ok(names.filter(|name| Quantity::from_name(name).is_some()).cloned().collect())
     }
 }
 
@@ -827,9 +758,6 @@ fn results(request: &TraceRequest, path: &TracedPath, trace: &Trace) -> [Named; 
     [work, velocity("v_min", trace.v_min), velocity("v_max", trace.v_max)]
 }
 
-/// Fraction of the greatest velocity that equally spaced rows show. Chosen: less is visible in a picture.
-const SHOWN_PEAK: f64 = 0.99;
-
 /// The description of the protocol, in a few lines.
 fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trace: &Trace) -> String {
     let all = |numbers: &[Named]| numbers.iter().map(Named::words).collect::<Vec<_>>().join(", ");
@@ -859,11 +787,6 @@ fn header(arguments: &Arguments, request: &TraceRequest, path: &TracedPath, trac
     match arguments.points {
         Some(_) => {
             text.push_str(&format!("  {rows}: equally spaced times, and the states before and after jumps\n"));
-            let fastest = trace.moments.iter().map(|moment| moment.v).fold(0.0, f64::max);
-            if fastest < SHOWN_PEAK * trace.v_max {
-                let fastest = words::number(fastest);
-                text.push_str(&format!("  these times miss v_max; the greatest v in the rows is {fastest}\n"));
-            }
         }
         None => {
             let (range, value) = (words::number(RANGE_RTOL), words::number(VALUE_RTOL));
@@ -887,20 +810,13 @@ fn status(status: Status, units: &Units) -> String {
     format!("{}{meaning}", status.name())
 }
 
-/// The aligned columns with their units. Times that nine digits do not distinguish have all digits.
+/// The aligned columns with their units.
 fn table(trace: &Trace, units: &Units) -> String {
-    let nine: Vec<String> = trace.moments.iter().map(|moment| words::number(moment.t)).collect();
-    let mut pairs = trace.moments.windows(2).zip(nine.windows(2));
-    let all_digits = pairs.any(|(moments, shown)| shown[0] == shown[1] && moments[0].t < moments[1].t);
     let columns = trace.columns();
     let mut lines = vec![columns.iter().map(|&column| COLUMNS[column].name.to_owned()).collect::<Vec<_>>()];
     lines.push(columns.iter().map(|&column| units.name(trace::unit(column)).to_owned()).collect());
     for moment in &trace.moments {
-        let cell = |column: usize| match Trace::value(moment, column) {
-            Some(t) if column == 0 && all_digits => format!("{t:?}"),
-            Some(value) => words::number(value),
-            None => "-".to_owned(),
-        };
+        let cell = |column: usize| Trace::value(moment, column).map_or_else(|| "-".to_owned(), words::number);
         lines.push(columns.iter().map(|&column| cell(column)).collect());
     }
     words::aligned(&lines, 2)

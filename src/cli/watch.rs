@@ -2,7 +2,7 @@
 
 use std::io::{IsTerminal, Write, stderr};
 use std::process;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
 use std::time::{Duration, Instant};
@@ -40,43 +40,21 @@ pub fn watched<T>(signal: &Signal, tables: Vec<(u64, u64)>, quiet: bool, work: i
     (result, signals().caught())
 }
 
-/// A long operation that writes nothing.
-pub struct Wait<'a> {
-    /// The current phase, such as "reading the footers of the parts".
-    pub doing: &'a str,
-    /// The progress: done, total, and the name of the things.
-    pub done: Option<(&'a AtomicU64, u64, &'a str)>,
-    /// Whether nothing is shown.
-    pub quiet: bool,
-}
-
-/// A phase without a known progress.
-impl<'a> From<&'a str> for Wait<'a> {
-    fn from(doing: &'a str) -> Wait<'a> {
-        Wait { doing, done: None, quiet: false }
-    }
-}
-
-/// Runs `work`, and shows its phase on a terminal after a second. Ctrl-C and SIGTERM end the process with a message that nothing has changed.
-/// Waits must not be nested.
-pub fn waiting<'a, T>(wait: impl Into<Wait<'a>>, work: impl FnOnce() -> T) -> T {
-    let (wait, start) = (wait.into(), Instant::now());
+/// Runs `work`, which writes nothing, and shows what it is `doing` on a terminal after a second. Ctrl-C and SIGTERM end the process with a message
+/// that nothing has changed. Waits must not be nested.
+pub fn waiting<T>(doing: &str, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
     let mut line: Option<ProgressBar> = None;
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
             line.iter().for_each(ProgressBar::finish_and_clear);
             // A message that cannot be written is ignored.
-            let _ = writeln!(stderr(), "stopped while {}; nothing has changed", wait.doing);
+            let _ = writeln!(stderr(), "stopped while {doing}; nothing has changed");
             process::exit(128 + number);
         }
-        if !wait.quiet && start.elapsed() > PROGRESS_DELAY && stderr().is_terminal() {
-            line.get_or_insert_with(text_line).set_message(match wait.done {
-                Some((done, all, thing)) => {
-                    let (done, all) = (words::count(done.load(Ordering::Relaxed)), words::things(all, thing));
-                    format!("{}: {done} of {all}", wait.doing)
-                }
-                None => format!("{} ({})", wait.doing, words::duration(start.elapsed().as_secs_f64().floor())),
-            });
+        if start.elapsed() > PROGRESS_DELAY && stderr().is_terminal() {
+            let seconds = words::duration(start.elapsed().as_secs_f64().floor());
+            line.get_or_insert_with(text_line).set_message(format!("{doing} ({seconds})"));
         }
     };
     let result = while_looking(look, work);

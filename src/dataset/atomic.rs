@@ -21,9 +21,7 @@ const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
 ///
 /// A file that cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
-    let temporary = filled(path, bytes)?;
-    temporary.persist(path).map_err(|error| failed(path, RENAME, error.error))?;
-    sync_folder_of(path)
+    write_with(path, |file| file.write_all(bytes)).map_err(|error| failed(path, "write", error))
 }
 
 /// Writes `bytes` to `path` in the same way, but never replaces a file: returns `false` if there is one.
@@ -32,39 +30,30 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
 ///
 /// A file that cannot be written.
 pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, DatasetError> {
-    match filled(path, bytes)?.persist_noclobber(path) {
-        Ok(_) => sync_folder_of(path).map(|()| true),
+    let write = || match filled(path, |file| file.write_all(bytes))?.persist_noclobber(path) {
+        Ok(_) => sync_folder(folder_of(path)).map(|()| true),
         Err(_) if path.exists() => Ok(false),
-        Err(error) => Err(failed(path, RENAME, error.error)),
-    }
+        Err(error) => Err(error.error),
+    };
+    write().map_err(|error| failed(path, "write", error))
 }
 
-/// Writes a file durably; `fill` writes the content.
+/// Writes a file in the same way; `fill` writes the content.
 ///
 /// # Errors
 ///
 /// The error of `fill`, or of the file system.
-#[cfg(feature = "cli")]
 pub fn write_with<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<(), E> {
-    let mut temporary = create(path)?;
-    fill(temporary.as_file_mut())?;
-    temporary.as_file().sync_all()?;
-    temporary.persist(path).map_err(|error| error.error)?;
+    filled(path, fill)?.persist(path).map_err(|error| error.error)?;
     Ok(sync_folder(folder_of(path))?)
 }
 
-const RENAME: &str = "rename the temporary file";
-
-/// A temporary file for `path` with these bytes, on the disk.
-fn filled(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, DatasetError> {
-    let mut temporary = create(path).map_err(|error| failed(path, "create", error))?;
-    temporary.as_file_mut().write_all(bytes).map_err(|error| failed(path, "write", error))?;
-    temporary.as_file().sync_all().map_err(|error| failed(path, "sync", error))?;
+/// A temporary file for `path` with the content that `fill` writes, on the disk.
+fn filled<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Result<(), E>) -> Result<NamedTempFile, E> {
+    let mut temporary = create(path)?;
+    fill(temporary.as_file_mut())?;
+    temporary.as_file().sync_all()?;
     Ok(temporary)
-}
-
-fn sync_folder_of(path: &Path) -> Result<(), DatasetError> {
-    sync_folder(folder_of(path)).map_err(|error| failed(path, "sync the folder", error))
 }
 
 /// The folder of a file.
@@ -121,14 +110,12 @@ pub fn sweep(folder: &Path, now: SystemTime) {
         if !is_temporary(&name) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        let abandoned = if name.ends_with(&ours) {
-            match File::open(entry.path()).map(|file| file.try_lock()) {
-                Ok(Ok(())) => true,
-                Ok(Err(TryLockError::WouldBlock)) => false,
-                _ => is_old(&entry, now),
-            }
-        } else {
-            is_old(&entry, now)
+        // The lock lasts until the file is removed, so that no process that is creating it loses it.
+        let file = File::open(entry.path());
+        let abandoned = match file.as_ref().map(File::try_lock) {
+            Ok(Ok(())) if name.ends_with(&ours) => true,
+            Ok(Err(TryLockError::WouldBlock)) => false,
+            _ => is_old(&entry, now),
         };
         if abandoned {
             let _ = fs::remove_file(entry.path());
@@ -157,9 +144,8 @@ pub fn time(folder: &Path, bytes: usize) -> Result<Duration, DatasetError> {
     let path = nearest_folder(folder).join("plan");
     let content = vec![0; bytes];
     let start = Instant::now();
-    let _temporary = filled(&path, &content)?;
-    sync_folder_of(&path)?;
-    Ok(start.elapsed())
+    let written = filled(&path, |file| file.write_all(&content)).and_then(|_file| sync_folder(folder_of(&path)));
+    written.map(|()| start.elapsed()).map_err(|error| failed(&path, "write", error))
 }
 
 /// Creates `folder` and its missing parents, each durably.
@@ -167,19 +153,11 @@ pub fn time(folder: &Path, bytes: usize) -> Result<Duration, DatasetError> {
 /// # Errors
 ///
 /// A folder that cannot be created.
-pub fn create_folder(folder: &Path) -> io::Result<()> {
-    if folder.is_dir() {
-        return Ok(());
-    }
-    let above = folder_of(folder);
-    if above != Path::new(".") {
-        create_folder(above)?;
-    }
-    match fs::create_dir(folder) {
-        // Another process was faster.
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists && folder.is_dir() => Ok(()),
-        created => created.and_then(|()| sync_folder(above)),
-    }
+pub fn create_folder(folder: &Path) -> Result<(), DatasetError> {
+    let missing: Vec<&Path> = folder.ancestors().take_while(|folder| !folder.is_dir()).collect();
+    let created = fs::create_dir_all(folder);
+    let synced = created.and_then(|()| missing.iter().try_for_each(|folder| sync_folder(folder_of(folder))));
+    synced.map_err(|error| failed(folder, "create the folder", error))
 }
 
 #[cfg(unix)]

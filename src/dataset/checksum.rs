@@ -4,13 +4,14 @@
 //! and of the page headers, which is checked when a part is opened. The contents of pages have their own checksums (CRC-32), checked when a page
 //! is read. During the computation, the checksums themselves count as zeros.
 
+use std::ops::Range;
+
 use bytes::Bytes;
 use parquet::errors::{ParquetError, Result};
-use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::FOOTER_SIZE;
+use parquet::file::metadata::{FooterTail, KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::reader::ChunkReader;
 use sha2::{Digest, Sha256};
-
-use super::metadata_limits::{TRAILER, footer_place, page_headers};
 
 /// The key of the checksum of footer and headers.
 const HEAD_KEY: &str = "slipsweep.head_sha256";
@@ -39,14 +40,11 @@ pub fn with_checksums(bytes: Vec<u8>) -> Result<Vec<u8>> {
     let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes)?;
     let head = head(&bytes, &metadata)?;
     let mut bytes = Vec::from(bytes);
-    let mut write = |key: &str, checksum: &dyn Fn(&[u8], usize) -> String| {
+    for key in [HEAD_KEY, FILE_KEY] {
         let place = place(&bytes, key).ok_or_else(|| ParquetError::General("no place for a checksum".to_owned()))?;
-        let checksum = checksum(&bytes, place);
+        let checksum = if key == HEAD_KEY { head.clone() } else { whole(&bytes, place) };
         bytes[place..place + BLANK.len()].copy_from_slice(checksum.as_bytes());
-        Ok::<(), ParquetError>(())
-    };
-    write(HEAD_KEY, &|_, _| head.clone())?;
-    write(FILE_KEY, &whole)?;
+    }
     Ok(bytes)
 }
 
@@ -73,15 +71,24 @@ pub fn is_head_intact(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Re
 
 /// The bytes of the footer with its length and `PAR1`.
 fn footer(file: &impl ChunkReader) -> Result<Vec<u8>> {
-    let place = footer_place(file)?;
-    let (start, length) = place.ok_or_else(|| ParquetError::General("its footer is damaged".to_owned()))?;
-    Ok(file.get_bytes(start, length + TRAILER as usize)?.to_vec())
+    let length = |end: u64, length: usize| end.checked_sub(length as u64).ok_or_else(|| damaged("footer"));
+    let end = length(file.len(), FOOTER_SIZE)?;
+    let tail = FooterTail::try_from(&file.get_bytes(end, FOOTER_SIZE)?[..])?;
+    let start = length(end, tail.metadata_length())?;
+    Ok(file.get_bytes(start, tail.metadata_length() + FOOTER_SIZE)?.to_vec())
 }
 
 /// The checksum of the page headers, in order, and of the footer.
 fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
     let mut hash = Sha256::new();
-    page_headers(file, metadata, |header| hash.update(header))?;
+    for chunk in metadata.row_groups().iter().flat_map(|group| group.columns()) {
+        let (start, length) = chunk.byte_range();
+        let data = u64::try_from(chunk.data_page_offset()).map_err(|_| damaged("list of columns"))?;
+        let dictionary = chunk.dictionary_page_offset().map(|_| start..data);
+        for page in dictionary.into_iter().chain([data..start.saturating_add(length)]) {
+            hash.update(page_header(file, page)?);
+        }
+    }
     let mut footer = footer(file)?;
     for key in [HEAD_KEY, FILE_KEY] {
         if let Some(place) = place(&footer, key) {
@@ -90,6 +97,25 @@ fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
     }
     hash.update(&footer);
     Ok(digits(hash))
+}
+
+/// Greatest size of the header of a page of a part, in bytes: 52 at most, see `chunk::add_page`.
+const MAX_HEADER_BYTES: u64 = 64;
+
+/// The header of a page of a part: the bytes before its content.
+fn page_header(file: &impl ChunkReader, page: Range<u64>) -> Result<Bytes> {
+    let length = page.end.checked_sub(page.start).ok_or_else(|| damaged("list of columns"))?;
+    let bytes = file.get_bytes(page.start, length.min(MAX_HEADER_BYTES) as usize)?;
+    // Every field is a byte and an integer in groups of seven bits. The third one is the size of the content, with the sign in the lowest bit.
+    let content = bytes.split_inclusive(|byte| *byte < 0x80).nth(5);
+    let content =
+        content.map(|digits| digits.iter().rev().fold(0, |size, digit| size << 7 | u64::from(digit & 0x7f)) >> 1);
+    let header = content.and_then(|content| length.checked_sub(content)).filter(|header| *header <= bytes.len() as u64);
+    header.map(|header| bytes.slice(..header as usize)).ok_or_else(|| damaged("page header"))
+}
+
+fn damaged(what: &str) -> ParquetError {
+    ParquetError::General(format!("its {what} is damaged"))
 }
 
 /// The offset of the checksum of a key: its last occurrence, since the spec before it may contain anything.

@@ -19,14 +19,6 @@ use super::rle;
 /// Runs of equal codes: code and number of rows.
 pub type Runs = Vec<(u32, usize)>;
 
-/// Appends a run, or continues the last one with an equal code.
-pub fn push(runs: &mut Runs, code: u32, rows: usize) {
-    match runs.last_mut() {
-        Some((last, total)) if *last == code => *total += rows,
-        _ => runs.push((code, rows)),
-    }
-}
-
 /// Least size of a compressed page, in bytes. Chosen: smaller pages cost more time than they save space.
 const MIN_COMPRESSED_BYTES: usize = 1 << 12;
 

@@ -1,5 +1,6 @@
 //! The folder of a dataset: `<name>/manifest.json` and `<name>/<table>/part-000000.parquet`.
 
+use std::borrow::Cow;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,20 +10,10 @@ use rayon::prelude::*;
 use super::atomic;
 use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, State};
+use crate::file;
 
 /// The help if the folder contains another dataset.
 const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
-
-/// How a spec gets the tables of a dataset that it lacks; a reduction has a key of `gap` instead of a table.
-fn remedy(missing: &[String]) -> String {
-    let of_gap = |name: &str| {
-        name.strip_prefix("gap_").map(|reduction| format!("set `reduce = \"{reduction}\"` in [tables.gap]"))
-    };
-    let tables: Vec<&str> = missing.iter().map(String::as_str).filter(|name| of_gap(name).is_none()).collect();
-    let tables = (!tables.is_empty()).then(|| format!("add [tables.{}] to the spec", tables.join("] and [tables.")));
-    let parts: Vec<String> = tables.into_iter().chain(missing.iter().filter_map(|name| of_gap(name))).collect();
-    format!("{}, which keeps its rows and computes yours", parts.join(" and "))
-}
 
 /// The errors of the files of a dataset.
 #[derive(Debug, thiserror::Error)]
@@ -40,10 +31,10 @@ pub enum DatasetError {
     OtherSpec { folder: String, table: String, expected: String, found: String, spec: String },
     /// The folder contains tables that the spec lacks, and lacks tables of the spec.
     #[error(
-        "{folder}: the spec and the dataset each have a table that the other lacks\n  in the spec: {expected}\n  in the dataset: {found}\n  help: {}; or {OTHER_SPEC_HELP}",
-        remedy(missing)
+        "{folder}: the spec and the dataset each have a table that the other lacks\n  in the spec: {expected}\n  in the dataset: {found}\n  help: add the \
+         tables of the dataset to the spec, which keeps its rows and computes yours; or {OTHER_SPEC_HELP}"
     )]
-    OtherTables { folder: String, expected: String, found: String, missing: Vec<String> },
+    OtherTables { folder: String, expected: String, found: String },
     /// Another run writes the dataset.
     #[error(
         "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
@@ -137,26 +128,22 @@ impl Folder {
     ///
     /// If it cannot be read, or if it is damaged and there are no parts.
     pub fn manifest(&self) -> Result<Option<Manifest>, DatasetError> {
-        let why = match self.read_manifest() {
-            Ok(Some(manifest)) => return Ok(Some(manifest)),
+        let read = self.read_manifest();
+        let why = match &read {
             Ok(None) => "missing".to_owned(),
-            Err(DatasetError::Manifest { path, why }) => match self.manifest_of_parts() {
-                Some(manifest) => return Ok(Some(Manifest { rebuilt: Some(format!("damaged: {why}")), ..manifest })),
-                None => return Err(DatasetError::Manifest { path, why }),
-            },
-            Err(error) => return Err(error),
+            Err(DatasetError::Manifest { why, .. }) => format!("damaged: {why}"),
+            _ => return read,
         };
-        Ok(self.manifest_of_parts().map(|manifest| Manifest { rebuilt: Some(why), ..manifest }))
+        match self.manifest_of_parts() {
+            Some(manifest) => Ok(Some(Manifest { rebuilt: Some(why), ..manifest })),
+            None => read,
+        }
     }
 
     /// The manifest from its file; `None` if there is no file.
     pub(super) fn read_manifest(&self) -> Result<Option<Manifest>, DatasetError> {
         let path = self.manifest_path();
-        let read = fs::metadata(&path).and_then(|metadata| {
-            // Reading a named pipe would wait for a writer, and a device might never end.
-            if metadata.is_file() { fs::read(&path) } else { Err(io::Error::other("it is not a file")) }
-        });
-        match read {
+        match file::read(&path) {
             Ok(bytes) => Manifest::from_bytes(&bytes)
                 .map(Some)
                 .map_err(|why| DatasetError::Manifest { path: path.display().to_string(), why }),
@@ -194,17 +181,11 @@ impl Folder {
                 return Err(DatasetError::OtherSpec { folder, table, expected, found: there, spec });
             }
         }
-        let lacks = |manifest: &Manifest, other: &Manifest| -> Vec<String> {
-            let names = other.tables.iter().map(|table| &table.name);
-            names.filter(|name| manifest.table(name).is_none()).cloned().collect()
-        };
-        let missing = lacks(expected, found);
-        if !missing.is_empty() && !lacks(found, expected).is_empty() {
-            let names = |manifest: &Manifest| {
-                manifest.tables.iter().map(|table| table.name.as_str()).collect::<Vec<_>>().join(", ")
-            };
-            let (expected, found) = (names(expected), names(found));
-            return Err(DatasetError::OtherTables { folder, expected, found, missing });
+        let names = |manifest: &Manifest| manifest.tables.iter().map(|table| table.name.clone()).collect::<Vec<_>>();
+        let (expected, found) = (names(expected), names(found));
+        if found.iter().any(|name| !expected.contains(name)) && expected.iter().any(|name| !found.contains(name)) {
+            let (expected, found) = (expected.join(", "), found.join(", "));
+            return Err(DatasetError::OtherTables { folder, expected, found });
         }
         Ok(())
     }
@@ -234,9 +215,8 @@ impl Folder {
     /// If a part is damaged, or does not belong to the dataset.
     pub fn verified(&self, manifest: &Manifest, table: &ManifestTable) -> Result<(Vec<PathBuf>, u64), DatasetError> {
         let there = self.parts_there(table).into_par_iter();
-        let opened: Result<Vec<Option<PathBuf>>, DatasetError> =
-            there.map(|part| self.verified_part(manifest, table, part)).collect();
-        let paths: Vec<PathBuf> = opened?.into_iter().flatten().collect();
+        let opened = there.filter_map(|part| self.verified_part(manifest, table, part).transpose());
+        let paths = opened.collect::<Result<Vec<PathBuf>, DatasetError>>()?;
         let missing = table.parts - paths.len() as u64;
         Ok((paths, missing))
     }
@@ -284,25 +264,20 @@ impl Folder {
     /// Files below the folder that do not belong to the dataset of `manifest`: temporary files of a run, and others.
     pub fn strays(&self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<PathBuf>) {
         let mut strays = Vec::new();
-        for path in sorted(&self.path, |_| true) {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            match manifest.table(&name) {
+        for path in sorted(&self.path, |path| *path != self.manifest_path()) {
+            match manifest.table(&name(&path)) {
                 Some(table) if path.is_dir() => {
                     strays.extend(sorted(&path, |path| self.part_at(table, path).is_none()));
                 }
-                _ if name == "manifest.json" => {}
                 _ => strays.push(path),
             }
         }
-        let is_temporary =
-            |path: &PathBuf| atomic::is_temporary(&path.file_name().unwrap_or_default().to_string_lossy());
-        strays.into_iter().partition(is_temporary)
+        strays.into_iter().partition(|path| atomic::is_temporary(&name(path)))
     }
 
     /// The number of the part of `table` with this `path`.
     fn part_at(&self, table: &ManifestTable, path: &Path) -> Option<u64> {
-        let name = path.file_name()?.to_string_lossy();
-        let part = name.strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
+        let part = name(path).strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
         (part < table.parts && self.part(&table.name, part) == path).then_some(part)
     }
 }
@@ -315,9 +290,14 @@ fn sorted(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     paths
 }
 
+/// The name of a file.
+fn name(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
+}
+
 /// Whether a file has the name of a part.
 fn is_part(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name(path);
     name.starts_with("part-") && name.ends_with(".parquet")
 }
 

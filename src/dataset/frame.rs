@@ -1,20 +1,20 @@
 //! Columns of a table, read part by part, so that memory does not grow with the table.
 
+use std::fs::File;
 use std::path::Path;
 
 use arrow_array::RecordBatchReader;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::statistics::Statistics;
 
 pub use super::cell::Cells;
 
 use super::cell::Cell;
 use super::folder::DatasetError;
-use super::guard::guarded;
-use super::metadata_limits::{self, coded};
+use super::guard::{coded, sound};
 use crate::file;
 
 /// Rows decoded in one batch. Chosen: a batch fits the cache of a core.
@@ -90,19 +90,19 @@ pub type Facts = Vec<(String, String)>;
 ///
 /// A file that cannot be read.
 pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
-    let file = file::open(path).map_err(|error| wrong(path, error))?;
-    let metadata = metadata_limits::footer(&file).map_err(|error| wrong(path, error))?;
-    let footer = metadata.file_metadata();
-    let schema = guarded(|| parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()))
-        .ok_or_else(|| wrong(path, "its schema is damaged"))?
-        .map_err(|error| wrong(path, error))?;
+    let read = || -> Result<_, ParquetError> {
+        let metadata = ParquetMetaDataReader::new().parse_and_finish(&file::open(path)?)?;
+        let footer = metadata.file_metadata();
+        let schema = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata())?;
+        Ok((schema, footer.key_value_metadata().cloned().unwrap_or_default()))
+    };
+    let (schema, entries) = sound(read).map_err(|error| wrong(path, error))?;
     let heading = |field: &arrow_schema::FieldRef| {
         let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
         let is_number = field.data_type().is_numeric();
         Heading { name: field.name().clone(), unit: entry("unit"), doc: entry("description"), is_number }
     };
-    let entries = footer.key_value_metadata().into_iter().flatten();
-    let entries = entries.filter_map(|entry| Some((entry.key.clone(), entry.value.clone()?))).collect();
+    let entries = entries.into_iter().filter_map(|entry| Some((entry.key, entry.value?))).collect();
     Ok((schema.fields().iter().map(heading).collect(), entries))
 }
 
@@ -112,7 +112,7 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
 ///
 /// A file that cannot be read, or a column that it does not have.
 pub fn read(path: &Path, names: &[&str]) -> Result<Frame, FrameError> {
-    open(path, Some(names), Rows::All)
+    open(path, Some(names), |all| all)
 }
 
 /// Decides from the least and the greatest number of each column whether to read a row group; a column without numbers has none.
@@ -124,7 +124,11 @@ pub type Keep<'a> = &'a dyn Fn(&dyn Fn(&str) -> Option<(f64, f64)>) -> bool;
 ///
 /// A file that cannot be read, or a column that it does not have.
 pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, FrameError> {
-    open(path, Some(names), Rows::Of(keep))
+    open(path, Some(names), |all| {
+        let groups = all.metadata().row_groups().iter().enumerate();
+        let kept = groups.filter(|(_, group)| keep(&|name| range(group, name))).map(|(place, _)| place).collect();
+        all.with_row_groups(kept)
+    })
 }
 
 /// All columns of a Parquet file.
@@ -133,7 +137,7 @@ pub fn read_where(path: &Path, names: &[&str], keep: Keep<'_>) -> Result<Frame, 
 ///
 /// A file that cannot be read.
 pub fn read_all(path: &Path) -> Result<Frame, FrameError> {
-    open(path, None, Rows::All)
+    open(path, None, |all| all)
 }
 
 /// The least and the greatest number of a column of a row group.
@@ -150,7 +154,7 @@ fn range(group: &RowGroupMetaData, name: &str) -> Option<(f64, f64)> {
 /// # Errors
 /// If the file cannot be read, or has no such row.
 pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
-    let frame = open(path, None, Rows::One(row))?;
+    let frame = open(path, None, |all| all.with_offset(row).with_limit(1))?;
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
@@ -159,41 +163,21 @@ pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
 /// # Errors
 /// If the file cannot be read.
 pub fn first(path: &Path, count: usize) -> Result<Frame, FrameError> {
-    open(path, None, Rows::First(count))
+    open(path, None, |all| all.with_limit(count))
 }
 
-/// The selection of rows of a file.
-enum Rows<'a> {
-    All,
-    /// So many from the first on.
-    First(usize),
-    /// Some row groups.
-    Of(Keep<'a>),
-    /// The row with this number.
-    One(usize),
-}
+/// A reader of some rows of a file, or all.
+type Builder = ParquetRecordBatchReaderBuilder<File>;
 
-/// Reads some or all columns of the selected rows.
-fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, FrameError> {
+/// Reads some or all columns of the rows that `select` selects.
+fn open(path: &Path, names: Option<&[&str]>, select: impl FnOnce(Builder) -> Builder) -> Result<Frame, FrameError> {
     let read = || -> Result<Frame, ParquetError> {
         let file = file::open(path)?;
         let metadata = coded(&file)?;
-        let mut builder =
-            ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE);
+        let mut builder = select(Builder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE));
         if let Some(names) = names {
             let mask = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
             builder = builder.with_projection(mask);
-        }
-        match rows {
-            Rows::All => {}
-            Rows::First(count) => builder = builder.with_limit(count),
-            Rows::One(row) => builder = builder.with_offset(row).with_limit(1),
-            Rows::Of(keep) => {
-                let groups = builder.metadata().row_groups().iter().enumerate();
-                let kept =
-                    groups.filter(|(_, group)| keep(&|name| range(group, name))).map(|(place, _)| place).collect();
-                builder = builder.with_row_groups(kept);
-            }
         }
         let reader = builder.build()?;
         let fields = reader.schema();
@@ -223,7 +207,5 @@ fn open(path: &Path, names: Option<&[&str]>, rows: Rows<'_>) -> Result<Frame, Fr
         }
         Ok(Frame { height, columns })
     };
-    guarded(read)
-        .unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())))
-        .map_err(|error| wrong(path, error))
+    sound(read).map_err(|error| wrong(path, error))
 }

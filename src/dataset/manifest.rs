@@ -85,12 +85,12 @@ impl Manifest {
     }
 
     /// The bytes of the file, which depend on the manifest alone. The last entry is the SHA-256 of the other text.
-    pub(super) fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
-        let mut text = serde_json::to_vec_pretty(self)?;
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
+        // A struct of text and numbers always has a JSON.
+        let text = serde_json::to_string_pretty(self).unwrap_or_default();
         let checksum = digits(Sha256::new().chain_update(&text));
-        text.truncate(text.len() - "\n}".len());
-        text.extend(format!(",\n  \"sha256\": \"{checksum}\"\n}}\n").into_bytes());
-        Ok(text)
+        let body = text.trim_end_matches("\n}");
+        format!("{body},\n  \"sha256\": \"{checksum}\"\n}}\n").into_bytes()
     }
 
     /// Reads the bytes of the file. Every changed bit is found, since only exactly the written bytes are accepted.
@@ -100,9 +100,6 @@ impl Manifest {
     /// The kind of damage.
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Manifest, String> {
         let manifest: Manifest = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
-        match manifest.to_bytes() {
-            Ok(written) if written == bytes => Ok(manifest),
-            _ => Err("its checksum does not match".to_owned()),
-        }
+        if manifest.to_bytes() == bytes { Ok(manifest) } else { Err("its checksum does not match".to_owned()) }
     }
 }

@@ -14,7 +14,6 @@ pub mod frame;
 mod guard;
 mod layout;
 mod manifest;
-mod metadata_limits;
 mod numbers;
 mod part;
 mod rle;
@@ -23,7 +22,6 @@ mod state;
 mod statistics;
 #[cfg(feature = "read")]
 mod survey;
-mod thrift;
 
 pub use batch::batch;
 pub use cell::Cell;
@@ -31,15 +29,14 @@ pub use folder::{DatasetError, Folder};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
 pub use frame::{FrameError, ReadError, Row};
-pub(crate) use guard::guarded;
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
+#[cfg(feature = "query")]
+pub(crate) use guard::sound;
+pub(crate) use guard::{coded, guarded};
 pub use layout::Layout;
 pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
-pub(crate) use metadata_limits::coded;
-#[cfg(feature = "query")]
-pub(crate) use metadata_limits::{check_footer, check_pages};
 pub use part::encode;
 pub use session::{Concurrency, Holder, Session};
 pub use state::{CheckDepth, PROGRAM, State};

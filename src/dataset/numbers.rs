@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use parquet::basic::Encoding;
 use parquet::file::statistics::Statistics;
 
-use super::chunk::{Chunk, Runs, page, push};
+use super::chunk::{Chunk, Runs, page};
 use super::dictionary;
 
 /// Numbers split in one block. Chosen: they stay in the first-level cache while all eight streams are written.
@@ -15,45 +15,22 @@ const BLOCK: usize = 512;
 
 /// Runs of rows with a number (1) and without one (0).
 pub fn presence(cells: &[f64]) -> Runs {
-    let mut runs = Runs::new();
-    for block in cells.chunks(64) {
-        let mut mask = present_mask(block);
-        let mut left = block.len() as u32;
-        while left > 0 {
-            let code = mask & 1;
-            let length = (if code == 1 { mask.trailing_ones() } else { mask.trailing_zeros() }).min(left);
-            push(&mut runs, code as u32, length as usize);
-            mask = mask.checked_shr(length).unwrap_or(0);
-            left -= length;
-        }
-    }
-    runs
-}
-
-/// One bit for each cell: 1 for a number.
-fn present_mask(block: &[f64]) -> u64 {
-    block.iter().enumerate().fold(0, |mask, (i, cell)| mask | u64::from(!cell.is_nan()) << i)
+    let runs = cells.chunk_by(|one, next| one.is_nan() == next.is_nan());
+    runs.map(|run| (u32::from(!run[0].is_nan()), run.len())).collect()
 }
 
 /// The chunk of `cells`; NaN is null.
 pub fn chunk(cells: &[f64]) -> Chunk {
     let present = presence(cells);
-    let count = present.iter().filter(|run| run.0 == 1).map(|run| run.1).sum();
-    let mut values = Vec::with_capacity(count);
-    let mut row = 0;
-    for &(code, length) in &present {
-        if code == 1 {
-            values.extend_from_slice(&cells[row..row + length]);
-        }
-        row += length;
-    }
+    let values = cells.split(|cell| cell.is_nan()).collect::<Vec<_>>().concat();
     if let Some((distinct, runs)) = repeating(&values) {
         return dictionary::numbers(&distinct, runs.into_iter(), Some(&present));
     }
     let mut data = page(Some(&present), 8 * values.len());
     let start = data.len();
     data.resize(start + 8 * values.len(), 0);
-    let range = split(&values, &mut data[start..]);
+    split(&values, &mut data[start..]);
+    let range = (!values.is_empty()).then(|| range(&values));
     Chunk {
         rows: cells.len(),
         dictionary: None,
@@ -68,31 +45,19 @@ type Repeated = (Vec<f64>, Vec<(usize, usize)>);
 
 /// Numbers with long runs, such as the optimal work along a landscape; `None` for a column without them.
 fn repeating(values: &[f64]) -> Option<Repeated> {
-    let changes_allowed = values.len().div_ceil(16);
-    let mut distinct = vec![*values.first()?];
-    let mut runs = Vec::new();
-    let mut start = 0;
-    for (place, pair) in values.windows(2).enumerate() {
-        if pair[0].to_bits() != pair[1].to_bits() {
-            if runs.len() + 1 >= changes_allowed {
-                return None;
-            }
-            runs.push((distinct.len() - 1, place + 1 - start));
-            distinct.push(pair[1]);
-            start = place + 1;
-        }
-    }
-    runs.push((distinct.len() - 1, values.len() - start));
-    Some((distinct, runs))
+    let most = values.len().div_ceil(16);
+    let runs = values.chunk_by(|one, next| one.to_bits() == next.to_bits());
+    let (distinct, lengths): (Vec<f64>, Vec<usize>) = runs.map(|run| (run[0], run.len())).take(most + 1).unzip();
+    let is_repeating = (1..=most).contains(&distinct.len());
+    is_repeating.then(|| (distinct, lengths.into_iter().enumerate().collect()))
 }
 
-/// Splits `values` into eight streams of bytes, one after another in `streams`; returns the least and the greatest value.
+/// Splits `values` into eight streams of bytes, one after another in `streams`.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn split(values: &[f64], streams: &mut [u8]) -> Option<(f64, f64)> {
-    let (mut least, mut greatest) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
+fn split(values: &[f64], streams: &mut [u8]) {
     let mut streams: Vec<&mut [u8]> = streams.chunks_mut(values.len().max(1)).collect();
     for (number, block) in values.chunks(BLOCK).enumerate() {
         for (byte, stream) in streams.iter_mut().enumerate() {
@@ -101,16 +66,26 @@ fn split(values: &[f64], streams: &mut [u8]) -> Option<(f64, f64)> {
                 *out = (value.to_bits() >> (8 * byte)) as u8;
             }
         }
-        for eight in block.chunks(8) {
-            for ((value, least), greatest) in eight.iter().zip(&mut least).zip(&mut greatest) {
-                *least = if *value < *least { *value } else { *least };
-                *greatest = if *value > *greatest { *value } else { *greatest };
-            }
+    }
+}
+
+/// Values compared side by side, so that the compiler uses vector instructions. Chosen: the widest vectors.
+const LANES: usize = 8;
+
+/// The least and the greatest of `values` that are not NaN; infinity and its opposite if there is none.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+pub fn range(values: &[f64]) -> (f64, f64) {
+    let (mut least, mut greatest) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+    for chunk in values.chunks(LANES) {
+        for ((value, least), greatest) in chunk.iter().zip(&mut least).zip(&mut greatest) {
+            *least = if *value < *least { *value } else { *least };
+            *greatest = if *value > *greatest { *value } else { *greatest };
         }
     }
-    let least = least.into_iter().fold(f64::INFINITY, f64::min);
-    let greatest = greatest.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    (!values.is_empty()).then_some((least, greatest))
+    (least.into_iter().fold(f64::INFINITY, f64::min), greatest.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// Statistics of a column of doubles: `range` is its least and greatest value.
@@ -123,7 +98,7 @@ pub fn double_statistics(range: Option<(f64, f64)>, nulls: u64) -> Statistics {
 
 #[cfg(test)]
 mod tests {
-    //! Runs, streams and ranges against straightforward implementations.
+    //! Streams and ranges against straightforward implementations.
 
     use super::*;
 
@@ -145,28 +120,17 @@ mod tests {
     }
 
     #[test]
-    fn presence_is_written_cell_by_cell() {
-        for count in [0, 1, 63, 64, 65, 1000, 4096] {
-            let cells = cells(count);
-            let present: Vec<bool> =
-                presence(&cells).into_iter().flat_map(|(code, length)| vec![code == 1; length]).collect();
-            assert_eq!(present, cells.iter().map(|cell| !cell.is_nan()).collect::<Vec<_>>());
-            assert!(presence(&cells).windows(2).all(|pair| pair[0].0 != pair[1].0));
-        }
-    }
-
-    #[test]
     fn streams_are_bytes_of_equal_place() {
         for count in [0, 1, 7, 8, 511, 512, 513, 3000] {
             let values: Vec<f64> = cells(2 * count).into_iter().filter(|cell| !cell.is_nan()).take(count).collect();
             let mut streams = vec![0; 8 * values.len()];
-            let range = split(&values, &mut streams);
+            split(&values, &mut streams);
             for (i, value) in values.iter().enumerate() {
                 let bytes: Vec<u8> = (0..8).map(|byte| streams[byte * values.len() + i]).collect();
                 assert_eq!(bytes, value.to_le_bytes());
             }
-            let least = values.iter().copied().reduce(f64::min);
-            assert_eq!(range, least.zip(values.iter().copied().reduce(f64::max)));
+            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+            assert_eq!(range(&values), (least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)));
         }
     }
 

@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use zstd::bulk::Compressor;
 
-use super::chunk::{Chunk, Runs, push};
+use super::chunk::{Chunk, Runs};
 use super::footer::Footer;
 use super::layout::Layout;
 use super::statistics::TableStatistics;
@@ -119,13 +119,18 @@ fn label(runs: &[(Option<&str>, usize)]) -> Chunk {
 }
 
 fn status_of(status: &[Status]) -> Chunk {
-    let codes = merge(status.iter().map(|&status| (status as u32, 1)));
+    let codes = status.chunk_by(|one, next| one == next).map(|run| (run[0] as u32, run.len())).collect();
     dictionary::words(&Status::ALL.map(Status::name), &codes, None)
 }
 
 /// Merges adjacent runs of equal codes.
 fn merge(codes: impl Iterator<Item = (u32, usize)>) -> Runs {
     let mut runs = Runs::new();
-    codes.for_each(|(code, rows)| push(&mut runs, code, rows));
+    for (code, rows) in codes {
+        match runs.last_mut() {
+            Some((last, total)) if *last == code => *total += rows,
+            _ => runs.push((code, rows)),
+        }
+    }
     runs
 }

@@ -3,13 +3,11 @@
 //! The lock only gives an early message. The manifest guarantees that two specs never mix: the first one stays.
 
 use std::fs::{self, File, TryLockError};
-use std::io;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
 use super::atomic;
-use super::folder::{DatasetError, Folder, failed};
+use super::folder::{DatasetError, Folder};
 use super::manifest::Manifest;
 
 /// Attempts to publish a manifest while another one appears and disappears. Chosen: each attempt fails only if another process does both in between.
@@ -23,8 +21,6 @@ pub struct Session {
     pub manifest: Manifest,
     /// The tables of this run.
     planned: Manifest,
-    /// The version of the manifest's file at the last comparison.
-    seen: Mutex<Option<FileVersion>>,
     _lock: Option<Lock>,
 }
 
@@ -37,21 +33,6 @@ pub enum Concurrency {
     Shards,
 }
 
-/// The version of a file: length, time and file number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct FileVersion(u64, Option<SystemTime>, u64);
-
-impl FileVersion {
-    fn of(path: &Path) -> io::Result<FileVersion> {
-        let metadata = fs::metadata(path)?;
-        #[cfg(unix)]
-        let number = std::os::unix::fs::MetadataExt::ino(&metadata);
-        #[cfg(not(unix))]
-        let number = 0;
-        Ok(FileVersion(metadata.len(), metadata.modified().ok(), number))
-    }
-}
-
 impl Folder {
     /// Prepares the folder for the parts of `planned`. An existing dataset with these tables stays unchanged; missing tables are added to it.
     ///
@@ -60,40 +41,35 @@ impl Folder {
     /// If the folder contains something else, or another run writes to it.
     pub fn open(&self, planned: &Manifest, company: Concurrency) -> Result<Session, DatasetError> {
         self.settle(planned)?;
-        let create =
-            |folder: &Path| atomic::create_folder(folder).map_err(|error| failed(folder, "create the folder", error));
-        create(self.path())?;
+        atomic::create_folder(self.path())?;
         let lock = lock(self.path(), company)?;
         let manifest = self.publish(planned)?;
         let now = SystemTime::now();
         atomic::sweep(self.path(), now);
         for table in &planned.tables {
             let folder = self.path().join(&table.name);
-            create(&folder)?;
+            atomic::create_folder(&folder)?;
             atomic::sweep(&folder, now);
         }
-        let folder = self.clone();
-        let session = Session { folder, manifest, planned: planned.clone(), seen: Mutex::default(), _lock: lock };
+        let session = Session { folder: self.clone(), manifest, planned: planned.clone(), _lock: lock };
         session.check()?;
         Ok(session)
     }
 
     /// The manifest that the folder needs for `planned`, and the required action.
     fn settle(&self, planned: &Manifest) -> Result<(Manifest, ManifestAction), DatasetError> {
-        let (found, step) = match self.read_manifest() {
+        let (found, mut action) = match self.read_manifest() {
             Ok(Some(found)) => (Some(found), ManifestAction::Keep),
             Ok(None) => {
-                let occupied = fs::read_dir(self.path()).is_ok_and(|entries| {
-                    entries.flatten().any(|entry| !entry.file_name().to_string_lossy().starts_with('.'))
-                });
+                let is_visible = |entry: fs::DirEntry| !entry.file_name().to_string_lossy().starts_with('.');
+                let occupied = fs::read_dir(self.path()).is_ok_and(|entries| entries.flatten().any(is_visible));
                 // Another run may just have published its manifest, which is its first file.
-                match self.read_manifest() {
-                    Ok(None) if !occupied => (None, ManifestAction::Create),
-                    Ok(None) => match self.manifest_of_parts() {
-                        Some(rebuilt) => (Some(rebuilt), ManifestAction::Create),
-                        None => return Err(DatasetError::Occupied { folder: self.path().display().to_string() }),
-                    },
-                    found => (found?, ManifestAction::Keep),
+                match (self.read_manifest()?, self.manifest_of_parts()) {
+                    (None, None) if occupied => {
+                        return Err(DatasetError::Occupied { folder: self.path().display().to_string() });
+                    }
+                    (None, rebuilt) => (rebuilt, ManifestAction::Create),
+                    (found, _) => (found, ManifestAction::Keep),
                 }
             }
             Err(error @ DatasetError::Manifest { .. }) => match self.manifest_of_parts() {
@@ -103,18 +79,20 @@ impl Folder {
             },
             Err(error) => return Err(error),
         };
-        let Some(found) = found else { return Ok((planned.clone(), step)) };
+        let Some(found) = found else { return Ok((planned.clone(), action)) };
         self.compare(planned, &found)?;
-        if found.covers(planned) && step == ManifestAction::Keep {
-            return Ok((found, ManifestAction::Keep));
+        if action == ManifestAction::Keep {
+            if found.covers(planned) {
+                return Ok((found, action));
+            }
+            action = ManifestAction::Replace;
         }
-        let step = if step == ManifestAction::Keep { ManifestAction::Replace } else { step };
         let mut settled = if found.tables.len() > planned.tables.len() { found } else { planned.clone() };
         settled.rebuilt = None;
         if settled.spec.is_empty() {
             settled.spec.clone_from(&planned.spec);
         }
-        Ok((settled, step))
+        Ok((settled, action))
     }
 
     /// Publishes the manifest for `planned`, and returns it.
@@ -122,18 +100,13 @@ impl Folder {
         let path = self.manifest_path();
         for _ in 0..ATTEMPTS {
             let (manifest, action) = self.settle(planned)?;
-            if action == ManifestAction::Keep {
-                return Ok(manifest);
-            }
-            let bytes = manifest
-                .to_bytes()
-                .map_err(|error| DatasetError::Manifest { path: path.display().to_string(), why: error.to_string() })?;
-            let written = match action {
-                ManifestAction::Create => atomic::write_new(&path, &bytes)?,
-                _ => atomic::write(&path, &bytes).map(|()| true)?,
+            // A run that creates a manifest may find that another run was faster.
+            let is_published = match action {
+                ManifestAction::Keep => true,
+                ManifestAction::Create => atomic::write_new(&path, &manifest.to_bytes())?,
+                ManifestAction::Replace => atomic::write(&path, &manifest.to_bytes()).map(|()| true)?,
             };
-            // Otherwise another run was faster.
-            if written {
+            if is_published {
                 return Ok(manifest);
             }
         }
@@ -167,22 +140,14 @@ impl Session {
         self.folder.write_part(table, part, bytes)
     }
 
-    /// Compares the current manifest with that of this run, if its file has changed.
+    /// Compares the current manifest with that of this run.
     ///
     /// # Errors
     ///
     /// If it has been removed or replaced.
     pub fn check(&self) -> Result<(), DatasetError> {
-        let stamp = FileVersion::of(&self.folder.manifest_path()).ok();
-        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        if stamp.is_some() && *seen == stamp {
-            return Ok(());
-        }
         match self.folder.read_manifest() {
-            Ok(Some(found)) if found.covers(&self.planned) => {
-                *seen = stamp;
-                Ok(())
-            }
+            Ok(Some(found)) if found.covers(&self.planned) => Ok(()),
             Ok(None) => Err(self.folder.taken("manifest.json was removed")),
             _ => Err(self.folder.taken("manifest.json was replaced by another one")),
         }
@@ -213,7 +178,7 @@ fn lock(folder: &Path, company: Concurrency) -> Result<Option<Lock>, DatasetErro
     match locked {
         Err(TryLockError::WouldBlock) => {
             let process =
-                holders(&file).first().map_or_else(String::new, |holder| format!(" (process {})", holder.process));
+                holders(&file).first().map_or(String::new(), |holder| format!(" (process {})", holder.process));
             Err(DatasetError::Busy { folder: folder.display().to_string(), process })
         }
         _ => Ok(Some(Lock(file))),

@@ -1,16 +1,19 @@
 //! The state of a part: whether its file is the expected one and intact.
 
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io;
+use std::ops::Range;
 use std::path::Path;
 
-use parquet::file::metadata::{KeyValue, ParquetMetaData};
+use bytes::Bytes;
+use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::reader::ChunkReader;
 
 use super::checksum;
 use super::footer::{Footer, PREFIX};
+use super::guard::sound;
 use super::manifest::{Manifest, ManifestTable};
-use super::metadata_limits;
 use super::statistics::TableStatistics;
+use crate::file;
 
 /// The depth of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,10 +53,10 @@ pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: Che
 
 /// The entries of the footer of a file, if footer and page headers are as they were written; `None` if there is no file.
 fn sealed_entries(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
-    let Some(file) = open(path)? else { return Ok(None) };
+    let Some(file) = there(file::open(path))? else { return Ok(None) };
     let metadata = metadata(&file)?;
     let entries = entries(&metadata);
-    match checksum::is_head_intact(&file, &metadata) {
+    match sound(|| checksum::is_head_intact(&file, &metadata)) {
         Ok(Some(true)) => Ok(Some(entries)),
         Ok(None) if Footer::from_entries(&entries).is_none() => {
             Err(stranger("a Parquet file that slipsweep did not write"))
@@ -68,47 +71,36 @@ pub fn footer_of(path: &Path) -> Option<Footer> {
     Footer::from_entries(&sealed_entries(path).ok()??)
 }
 
-/// Opens the file in `path`. Only plain files are opened: a named pipe would wait for a writer, and a device might never end.
-fn open(path: &Path) -> Result<Option<File>, State> {
-    let opened = fs::metadata(path).and_then(|metadata| match metadata.file_type() {
-        kind if kind.is_file() => File::open(path).map(Ok),
-        kind if kind.is_dir() => Ok(Err("a folder")),
-        _ => Ok(Err("a device, a named pipe or the like")),
-    });
-    match opened {
-        Ok(Ok(file)) => Ok(Some(file)),
-        Ok(Err(found)) => Err(stranger(found)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+/// The result of opening or reading a file; `None` if there is none.
+fn there<T>(read: io::Result<T>) -> Result<Option<T>, State> {
+    let error = match read {
+        Ok(found) => return Ok(Some(found)),
+        Err(error) => error,
+    };
+    match error.kind() {
+        io::ErrorKind::NotFound => Ok(None),
+        io::ErrorKind::InvalidInput => Err(stranger(&error.to_string())),
         // It may be intact.
-        Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+        io::ErrorKind::PermissionDenied => {
             let expected = "a file that this user can read".to_owned();
             Err(State::Foreign { what: "user", expected, found: error.to_string() })
         }
-        Err(error) => damaged(&unreadable(&error)),
+        _ => damaged(&format!("it cannot be read: {error}")),
     }
 }
 
 fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
-    let Some(mut file) = open(path)? else { return Ok(None) };
-    let mut bytes = Vec::new();
-    if let Err(error) = file.read_to_end(&mut bytes) {
-        return damaged(&unreadable(&error));
-    }
-    let bytes = bytes::Bytes::from(bytes);
+    let Some(bytes) = there(file::read(path))? else { return Ok(None) };
     let is_intact = checksum::is_intact(&bytes);
     if is_intact == Some(false) {
         return damaged("its checksum does not match its bytes");
     }
-    let entries = entries(&metadata(&bytes)?);
+    let entries = entries(&metadata(&Bytes::from(bytes))?);
     // Without a checksum, either it is damaged, or the file is foreign.
     if is_intact.is_none() && entries.iter().any(|entry| entry.key.starts_with(PREFIX)) {
         return damaged("it has no checksum");
     }
     Ok(Some(entries))
-}
-
-fn unreadable(error: &io::Error) -> String {
-    format!("it cannot be read: {error}")
 }
 
 /// What is foreign about a file of another program, such as a part that a user edited.
@@ -123,8 +115,9 @@ fn damaged<T>(why: &str) -> Result<T, State> {
     Err(State::Damaged { why: why.to_owned() })
 }
 
-fn metadata<R: parquet::file::reader::ChunkReader>(file: &R) -> Result<ParquetMetaData, State> {
-    metadata_limits::footer(file).or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
+fn metadata(file: &impl ChunkReader) -> Result<ParquetMetaData, State> {
+    let read = sound(|| ParquetMetaDataReader::new().parse_and_finish(file));
+    read.or_else(|error| damaged(&format!("it is cut short or not Parquet: {error}")))
 }
 
 fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
@@ -140,8 +133,12 @@ fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) ->
         return Err(stranger("a Parquet file that slipsweep did not write"));
     };
     let planned = manifest.table(table);
-    let rows = planned.map(|planned| planned.rows_of(part));
-    let hash = |table: Option<&ManifestTable>| table.map_or_else(String::new, |table| table.hash.clone());
+    let hash = |table: Option<&ManifestTable>| table.map_or(String::new(), |table| table.hash.clone());
+    let plan = |table: Option<&ManifestTable>| {
+        table.map_or(String::new(), |table| format!("{} rows in {} parts", table.rows, table.parts))
+    };
+    let place = |rows: &Range<u64>| format!("rows {} to {}", rows.start, rows.end);
+    let rows = planned.map(|planned| planned.rows_of(part)).unwrap_or_default();
     if let Some((what, expected, found)) = manifest.build.difference(&found.manifest.build) {
         foreign(what, expected, found)
     } else if found.table != table {
@@ -149,12 +146,9 @@ fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) ->
     } else if hash(found.planned()) != hash(planned) {
         foreign("spec", &hash(planned), &hash(found.planned()))
     } else if found.planned() != planned {
-        let show = |table: &ManifestTable| format!("{} rows in {} parts", table.rows, table.parts);
-        let [planned, found] = [planned, found.planned()].map(|table| table.map(show).unwrap_or_default());
-        foreign("plan", &planned, &found)
-    } else if Some(&found.rows) != rows.as_ref() {
-        let show = |rows: &std::ops::Range<u64>| format!("rows {} to {}", rows.start, rows.end);
-        foreign("place in the table", &rows.as_ref().map(show).unwrap_or_default(), &show(&found.rows))
+        foreign("plan", &plan(planned), &plan(found.planned()))
+    } else if found.rows != rows {
+        foreign("place in the table", &place(&rows), &place(&found.rows))
     } else {
         Ok(statistics)
     }

@@ -6,12 +6,14 @@
 use std::ops;
 
 use arrow_schema::ArrowError;
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use super::batch::batch;
 use super::cell::{Cell, exact, first_row};
 use super::footer::StatusCounts;
 use super::layout::Layout;
+use super::numbers;
 use crate::grid::{Point, Quantity, RowIndex, Scale, View};
 use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
@@ -186,20 +188,10 @@ impl Row {
 
 impl Range {
     fn of(column: &str, cells: &[f64]) -> Range {
-        /// Values compared side by side, so that the compiler uses vector instructions. Chosen: the widest vectors.
-        const LANES: usize = 8;
-        let (mut count, mut least, mut greatest) = (0, [f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-        for chunk in cells.chunks(LANES) {
-            for ((&value, least), greatest) in chunk.iter().zip(&mut least).zip(&mut greatest) {
-                count += u64::from(!value.is_nan());
-                *least = if value < *least { value } else { *least };
-                *greatest = if value > *greatest { value } else { *greatest };
-            }
-        }
+        let count = cells.iter().filter(|cell| !cell.is_nan()).count() as u64;
+        let (least, greatest) = numbers::range(cells);
         // Of two zeros, the sign would depend on the order.
-        let least = least.into_iter().fold(f64::INFINITY, f64::min) + 0.0;
-        let greatest = greatest.into_iter().fold(f64::NEG_INFINITY, f64::max) + 0.0;
-        Range { column: column.to_owned(), count, least, greatest }
+        Range { column: column.to_owned(), count, least: least + 0.0, greatest: greatest + 0.0 }
     }
 }
 
@@ -288,9 +280,6 @@ fn least_in(stretch: ops::Range<usize>, gaps: &[f64], status: &[Status]) -> Opti
     Some((first, rows.fold(first, |least, row| if gaps[row] < gaps[least] { row } else { least })))
 }
 
-/// The key of a transition, its first row with status `ok` and its row of least gap.
-type LeastGapRows = (Vec<f64>, usize, usize);
-
 /// Whether there are many transitions; and for each, or for all if there are many, the first row with status `ok` and the row of least gap, as
 /// indices in `buffer`.
 fn least(
@@ -307,8 +296,9 @@ fn least(
     // The current run of every key: its value and its end.
     let mut runs: Vec<_> = keys.iter().map(|(_, runs)| (runs.over(rows.clone()), f64::NAN, 0)).collect();
     let family = keys.iter().position(|(axis, _)| *axis == Quantity::Family);
-    let (mut many, mut found) = (false, Vec::<LeastGapRows>::new());
-    let (mut place, mut current) = (0, 0);
+    // The first row and the row of least gap by the values of the keys.
+    let (mut many, mut found) = (false, IndexMap::<Vec<u64>, (usize, usize)>::new());
+    let mut place = 0;
     while place < buffer.status.len() {
         let mut end = buffer.status.len();
         for ((_, values), (run, value, stop)) in keys.iter().zip(&mut runs) {
@@ -325,32 +315,23 @@ fn least(
         if member.is_some_and(|member| !member.arrives) {
             continue;
         }
-        let best = least_in(stretch, gaps, &buffer.status);
-        let Some((first, least)) = best else { continue };
-        let is_same = |(key, ..): &LeastGapRows| {
-            many || key.iter().zip(&runs).all(|(key, (_, value, _))| key.to_bits() == value.to_bits())
-        };
-        if !found.get(current).is_some_and(is_same) {
-            current = found.iter().position(is_same).unwrap_or(found.len());
-        }
-        match found.get_mut(current) {
-            Some((.., known)) if gaps[least] < gaps[*known] => *known = least,
-            Some(_) => {}
-            None => found.push((runs.iter().map(|(_, value, _)| *value).collect(), first, least)),
+        let Some((first, least)) = least_in(stretch, gaps, &buffer.status) else { continue };
+        let key = if many { Vec::new() } else { runs.iter().map(|(_, value, _)| value.to_bits()).collect() };
+        let (_, known) = found.entry(key).or_insert((first, least));
+        if gaps[least] < gaps[*known] {
+            *known = least;
         }
         if found.len() > MAX_KEPT_ROWS {
             many = true;
             let rank = |row: usize| (gaps[row], row);
-            let less = |one: LeastGapRows, other: LeastGapRows| if rank(other.2) < rank(one.2) { other } else { one };
-            found = found.into_iter().reduce(less).into_iter().collect();
-            current = 0;
+            let best = found.drain(..).map(|(_, (_, least))| least);
+            let best = best.reduce(|one, other| if rank(other) < rank(one) { other } else { one });
+            found.extend(best.map(|best| (Vec::new(), (best, best))));
         }
     }
-    if many {
-        // Without distinction, the first row is the row of least gap.
-        found.iter_mut().for_each(|(_, first, least)| *first = *least);
-    }
-    (many, found.into_iter().map(|(_, first, least)| (first, least)).collect())
+    // Without distinction, the first row is the row of least gap.
+    let rows = found.into_values().map(|(first, least)| if many { (least, least) } else { (first, least) });
+    (many, rows.collect())
 }
 
 /// Row number `number` of the table, whose cells are at index `place` of `buffer`.

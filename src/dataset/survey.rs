@@ -23,7 +23,7 @@ pub struct Survey {
 }
 
 /// The survey of a table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct TableSurvey {
     /// Its name.
     pub name: String,
@@ -77,11 +77,7 @@ impl Survey {
                 name: table.name.clone(),
                 rows: table.rows,
                 parts: table.parts,
-                there: 0,
-                missing: Vec::new(),
-                damaged: Vec::new(),
-                foreign: Vec::new(),
-                statistics: TableStatistics::default(),
+                ..TableSurvey::default()
             };
             let mut next = 0;
             let there = folder.parts_there(table);

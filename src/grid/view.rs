@@ -1,9 +1,7 @@
 //! A view of consecutive rows of a table: values as runs.
 
-use std::collections::HashMap;
 use std::ops::Range;
 
-use super::axis::Axis;
 use super::block::Digit;
 use super::expression::Scratch;
 use super::quantity::{Point, Quantity};
@@ -12,9 +10,6 @@ use super::sampler::Sampler;
 
 /// Points of an evaluation batch. Chosen: their columns fit the cache of a core.
 const BATCH_POINTS: usize = 1 << 10;
-
-/// Greatest number of axis steps in a code table. Chosen: it takes half a MiB.
-const MAX_TABLE_STEPS: u64 = 1 << 16;
 
 /// Rows of a table that are contiguous in the product of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -101,29 +96,40 @@ impl<'a> View<'a> {
             let values = (first..first + steps).map(|turn| axis.values.at(turn % digit.len)).collect();
             return Some(Runs { values, order: Order::Cyclic { digit, segment: segment.clone() } });
         }
-        let mut runs = Listed::default();
-        let (mut scratch, mut starts) = (Scratch::default(), Vec::new());
+        let (mut values, mut starts) = (Vec::<f64>::new(), Vec::new());
+        let (mut scratch, mut rows) = (Scratch::default(), Vec::new());
+        // Adds the values at `rows` of the table, each with its row of the product; computed ones only where they differ.
+        let mut take = |sampler: &Sampler<'_>, rows: &mut Vec<(u64, u64)>, is_computed: bool| {
+            sampler.pick(&rows.iter().map(|(_, raw)| *raw).collect::<Vec<u64>>(), &mut scratch);
+            for ((row, _), &value) in rows.drain(..).zip(scratch.column(quantity)) {
+                if !is_computed || values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
+                    values.push(value);
+                    starts.push(row);
+                }
+            }
+        };
         for group in segments.chunk_by(|one, next| one.block == next.block) {
             let block_rows = &blocks[group[0].block];
-            if let Some((digit, axis)) = block_rows.axis(quantity) {
-                runs.take_steps(digit, axis, group);
-                continue;
-            }
             let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
+            let (axis, mut last) = (block_rows.axis(quantity), None);
             for segment in group {
                 let stride = sampler.run().unwrap_or(u64::MAX);
                 let mut raw = segment.raw.start;
                 while raw < segment.raw.end {
-                    starts.push((segment.first + (raw - segment.raw.start), raw));
+                    let step = axis.map(|(digit, _)| digit.step(raw));
+                    if step.is_none() || step != last {
+                        rows.push((segment.first + (raw - segment.raw.start), raw));
+                    }
+                    last = step;
                     raw = (raw / stride + 1).saturating_mul(stride);
                 }
-                if starts.len() >= BATCH_POINTS {
-                    runs.take_values(&sampler, quantity, &mut starts, &mut scratch);
+                if rows.len() >= BATCH_POINTS {
+                    take(&sampler, &mut rows, axis.is_none());
                 }
             }
-            runs.take_values(&sampler, quantity, &mut starts, &mut scratch);
+            take(&sampler, &mut rows, axis.is_none());
         }
-        Some(Runs { values: runs.values, order: Order::Listed { starts: runs.starts, codes: runs.codes } })
+        Some(Runs { values, order: Order::Listed(starts) })
     }
 
     /// The words of the label `name` over `rows` as runs: word, or `None`, and number of rows.
@@ -161,67 +167,6 @@ impl<'a> View<'a> {
     }
 }
 
-/// A builder of runs: the first row of each, and the index of its value.
-#[derive(Default)]
-struct Listed {
-    starts: Vec<u64>,
-    codes: Vec<u32>,
-    values: Vec<f64>,
-}
-
-impl Listed {
-    fn push(&mut self, row: u64, code: u32) {
-        if self.codes.last() != Some(&code) {
-            self.starts.push(row);
-            self.codes.push(code);
-        }
-    }
-
-    /// Adds the steps of a factor axis over `segments`.
-    fn take_steps(&mut self, digit: Digit, axis: &Axis, segments: &[Segment]) {
-        // The code of each step, in a table if it is small: there may be as many runs as rows.
-        let mut table = vec![None; if digit.len <= MAX_TABLE_STEPS { digit.len as usize } else { 0 }];
-        let mut map = HashMap::new();
-        for segment in segments {
-            let mut raw = segment.raw.start;
-            let mut step = digit.step(raw);
-            let mut next = digit.next(raw);
-            while raw < segment.raw.end {
-                let slot = match table.get_mut(step as usize) {
-                    Some(slot) => slot,
-                    None => map.entry(step).or_insert(None),
-                };
-                let code = *slot.get_or_insert_with(|| {
-                    self.values.push(axis.values.at(step));
-                    self.values.len() as u32 - 1
-                });
-                self.push(segment.first + (raw - segment.raw.start), code);
-                raw = next;
-                next = next.saturating_add(digit.stride);
-                step = if step + 1 == digit.len { 0 } else { step + 1 };
-            }
-        }
-    }
-
-    /// Adds the values of a computed axis at `starts`, rows of the table with their rows of the product.
-    fn take_values(
-        &mut self,
-        sampler: &Sampler<'_>,
-        quantity: Quantity,
-        starts: &mut Vec<(u64, u64)>,
-        scratch: &mut Scratch,
-    ) {
-        let raw: Vec<u64> = starts.iter().map(|(_, raw)| *raw).collect();
-        sampler.pick(&raw, scratch);
-        for ((row, _), &value) in starts.drain(..).zip(scratch.column(quantity)) {
-            if self.values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
-                self.values.push(value);
-            }
-            self.push(row, self.values.len() as u32 - 1);
-        }
-    }
-}
-
 /// The values of one quantity over a range of rows.
 #[derive(Debug, Clone)]
 pub struct Runs {
@@ -233,12 +178,12 @@ pub struct Runs {
 enum Order {
     /// The periodic steps of a factor axis.
     Cyclic { digit: Digit, segment: Segment },
-    /// The first row of each run, and the index of its value.
-    Listed { starts: Vec<u64>, codes: Vec<u32> },
+    /// The first row of each run, in the order of the values.
+    Listed(Vec<u64>),
 }
 
 impl Runs {
-    /// The values, one for each step, in the order of their first row.
+    /// The values in the order of their first row: one for each step of a factor axis, else one for each run.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
@@ -250,46 +195,41 @@ impl Runs {
                 let raw = segment.raw.start + (row - segment.first);
                 ((raw / digit.stride - segment.raw.start / digit.stride) % digit.len) as usize
             }
-            Order::Listed { starts, codes } => codes[Runs::run_at(starts, row)] as usize,
+            Order::Listed(starts) => starts.partition_point(|start| *start <= row).saturating_sub(1),
         }
-    }
-
-    fn run_at(starts: &[u64], row: u64) -> usize {
-        starts.partition_point(|start| *start <= row).saturating_sub(1)
     }
 
     /// The runs over `rows`, a part of the rows: index into [`Runs::values`], and number of rows.
     pub fn over(&self, rows: Range<u64>) -> impl Iterator<Item = (usize, usize)> + '_ {
         let mut row = rows.start;
-        // The step of a factor axis and the first row of the next step, or the current run.
-        let (mut place, mut next) = match &self.order {
-            _ if rows.is_empty() => (0, 0),
+        let mut step = if rows.is_empty() { 0 } else { self.step_of(row) };
+        // The first row of the next step of a factor axis.
+        let mut next = match &self.order {
             Order::Cyclic { digit, segment } => {
-                let raw = segment.raw.start + (row - segment.first);
-                (self.step_of(row), row.saturating_add(digit.next(raw) - raw))
+                let raw = segment.raw.start + row.saturating_sub(segment.first);
+                row.saturating_add(digit.next(raw) - raw)
             }
-            Order::Listed { starts, .. } => (Runs::run_at(starts, row), 0),
+            Order::Listed(_) => 0,
         };
         std::iter::from_fn(move || {
             if row >= rows.end {
                 return None;
             }
-            let (step, end) = match &self.order {
+            let here = step;
+            step += 1;
+            let end = match &self.order {
                 Order::Cyclic { digit, .. } => {
-                    let run = (place, next);
+                    step = if step as u64 == digit.len { 0 } else { step };
+                    let end = next;
                     next = next.saturating_add(digit.stride);
-                    place = if place as u64 + 1 == digit.len { 0 } else { place + 1 };
-                    run
+                    end
                 }
-                Order::Listed { starts, codes } => {
-                    place += 1;
-                    (codes[place - 1] as usize, starts.get(place).copied().unwrap_or(u64::MAX))
-                }
+                Order::Listed(starts) => starts.get(step).copied().unwrap_or(u64::MAX),
             };
             let end = end.min(rows.end);
             let length = (end - row) as usize;
             row = end;
-            Some((step, length))
+            Some((here, length))
         })
     }
 }

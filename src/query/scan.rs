@@ -28,7 +28,7 @@ use rayon::prelude::*;
 
 use super::filter::{Condition, Top, kept, of_predicate};
 use super::groups::{GroupAggregation, GroupQuery};
-use crate::dataset::{check_footer, check_pages, guarded, label};
+use crate::dataset::{self, label};
 
 /// The rows of Parquet files with equal columns, one file after another.
 #[derive(Clone)]
@@ -201,8 +201,7 @@ fn unreadable(path: &Path, error: &ParquetError) -> PolarsError {
 
 /// The result of reading a file; a panic of the reader is a fault of the file.
 fn sound<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> PolarsResult<T> {
-    let read = guarded(read).unwrap_or_else(|| Err(ParquetError::General("it is damaged".to_owned())));
-    read.map_err(|error| unreadable(path, &error))
+    dataset::sound(read).map_err(|error| unreadable(path, &error))
 }
 
 /// Whether a file is at fault, rather than the query.
@@ -213,7 +212,6 @@ pub fn is_unreadable(error: &PolarsError) -> bool {
 /// Opens a Parquet file. Words are read as dictionaries in a dataset, else as text.
 fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
     let file = File::open(path)?;
-    check_footer(&file)?;
     let stored = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;
     let read = |field: &FieldRef| match field.data_type() {
         ArrowType::LargeUtf8 | ArrowType::Utf8View | ArrowType::Dictionary(..) if *field.data_type() != label() => {
@@ -239,7 +237,6 @@ impl Files {
         take: &mut dyn FnMut(RecordBatch, Vec<bool>) -> Result<usize, ParquetError>,
     ) -> Result<(), ParquetError> {
         let (file, metadata) = open(path)?;
-        check_pages(&file, metadata.metadata())?;
         let names: BTreeSet<&str> = names.chain(conditions.iter().map(|condition| condition.column.as_str())).collect();
         for name in &names {
             let found = metadata.schema().field_with_name(name).ok();

@@ -1,8 +1,8 @@
 //! One axis of a spec: numbers, words, a range, an expression or a sample, checked against its legal values.
 
 use super::error::{SpecError, refuse, unknown};
-use super::read::help_for_word;
-use super::spec::{AXIS, AxisForm, AxisSpec, AxisValue};
+use super::read::HELP_FOR_NUMBER;
+use super::spec::{AxisForm, AxisSpec, AxisValue};
 use super::units::{help, legal};
 use crate::grid::{Axis, Design, Quantity, Scale, Values};
 use crate::model::Units;
@@ -45,12 +45,8 @@ pub struct Sampled {
 ///
 /// An axis with values that are not legal for `quantity`.
 pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Result<Written, SpecError> {
-    let words = quantity.words();
     let axis = AxisDraft { quantity, units, scale: Scale::Model, key };
     let values = match spec {
-        AxisSpec::One(AxisValue::Word(word)) if words.is_empty() => {
-            return refuse(key, format!("found string {word:?}"), AXIS, help_for_word(word));
-        }
         AxisSpec::One(one) => vec![axis.value(key, one)?],
         AxisSpec::List(values) if values.is_empty() => {
             return refuse(key, "an empty list", "at least one value", "add values, or remove the axis");
@@ -59,17 +55,12 @@ pub fn read(quantity: Quantity, units: &Units, key: &str, spec: &AxisSpec) -> Re
             let values = values.iter().enumerate();
             values.map(|(index, one)| axis.value(&format!("{key}[{index}]"), one)).collect::<Result<_, _>>()?
         }
-        AxisSpec::Form(_) if !words.is_empty() => {
-            let expected = format!("one or a list of {}", quoted(&words));
-            return refuse(key, "found a table", expected, "write the words as a list");
+        AxisSpec::Form(_) if !quantity.words().is_empty() => {
+            return refuse(key, "found a table", quantity.words().join(", "), "write the words as a list");
         }
         AxisSpec::Form(form) => return AxisDraft { scale: axis.scale_of(form)?, ..axis }.form(form),
     };
     Ok(axis.written(Values::List(values)))
-}
-
-fn quoted(words: &[&str]) -> String {
-    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
 }
 
 /// The index of `word`, found at `key`, among those of `quantity`.
@@ -81,7 +72,7 @@ pub fn word(key: &str, quantity: Quantity, word: &str) -> Result<f64, SpecError>
     let words = quantity.words();
     match words.iter().position(|known| *known == word) {
         Some(place) => Ok(place as f64),
-        None if words.is_empty() => refuse(key, format!("found string {word:?}"), "a number", help_for_word(word)),
+        None if words.is_empty() => refuse(key, format!("found {word:?}"), "a number", HELP_FOR_NUMBER),
         None => Err(unknown(key.to_owned(), quantity.name(), word, &words)),
     }
 }
@@ -100,28 +91,23 @@ impl AxisDraft<'_> {
         Written::Values(Axis { quantity: self.quantity, scale: self.scale, values })
     }
 
-    fn legal(self, value: f64) -> Result<(), String> {
-        legal(self.units, self.quantity, self.scale, value)
-    }
-
     /// One value: a number in its range, or the index of a word.
     fn value(self, key: &str, value: &AxisValue) -> Result<f64, SpecError> {
-        let words = self.quantity.words();
         match value {
             AxisValue::Word(found) => word(key, self.quantity, found),
-            AxisValue::Number(number) if !words.is_empty() => {
-                let expected = format!("one of {}", quoted(&words));
-                refuse(key, format!("found {number:?}"), expected, "write the word in quotes")
+            AxisValue::Number(number) if !self.quantity.words().is_empty() => {
+                refuse(key, format!("found {number:?}"), self.quantity.words().join(", "), "write the word in quotes")
             }
-            AxisValue::Number(number) => match self.legal(*number) {
-                Ok(()) => Ok(*number),
-                Err(legal) => self.out_of_range(key, *number, legal),
-            },
+            AxisValue::Number(number) => self.legal(key, *number),
         }
     }
 
-    fn out_of_range<T>(self, key: &str, value: f64, legal: String) -> Result<T, SpecError> {
-        refuse(key, format!("{value:?} is out of range"), legal, help(self.units, self.quantity, value))
+    /// A number in its range.
+    fn legal(self, key: &str, value: f64) -> Result<f64, SpecError> {
+        let legal = legal(self.units, self.quantity, self.scale, value).map(|()| value);
+        legal.map_err(|legal| {
+            SpecError::new(key, format!("{value:?} is out of range"), legal, help(self.units, self.quantity, value))
+        })
     }
 
     /// The unit of the values of a table.
@@ -130,9 +116,8 @@ impl AxisDraft<'_> {
         let known = self.quantity.scales();
         let name = |scale: Scale| unit_name(self.units, self.quantity, scale);
         known.iter().copied().find(|scale| name(*scale) == unit).ok_or_else(|| {
-            let units: Vec<String> = known.iter().map(|scale| format!("\"{}\"", name(*scale))).collect();
-            let (key, help) = (format!("{}.unit", self.key), "correct the unit, or remove it");
-            SpecError::new(key, format!("unknown unit {unit:?}"), units.join(" or "), help)
+            let names: Vec<&str> = known.iter().map(|scale| name(*scale)).collect();
+            unknown(format!("{}.unit", self.key), "unit", unit, &names)
         })
     }
 
@@ -147,69 +132,55 @@ impl AxisDraft<'_> {
             ("lhs", form.lhs.is_some()),
         ];
         let written: Vec<&str> = forms.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name).collect();
-        if let [one, other, ..] = written.as_slice() {
-            return refuse(key, format!("both {one} and {other}"), "one of them", "remove one of the two");
-        }
+        let expected = format!("one of {}", forms.map(|(name, _)| name).join(", "));
+        let [_] = written.as_slice() else {
+            let found = if written.is_empty() { "a table without a range".to_owned() } else { written.join(" and ") };
+            return refuse(key, found, expected, "write { linspace = [first, last, count] }, a number or a list");
+        };
         if form.seed.is_some() && form.sobol.is_none() && form.lhs.is_none() {
             return refuse(
                 format!("{key}.seed"),
-                "a seed without a sampled design",
+                "a seed without a sample",
                 "sobol or lhs in the same axis",
                 "remove it",
             );
         }
         match form {
-            AxisForm { linspace: Some(numbers), .. } => self.range(false, numbers),
-            AxisForm { geomspace: Some(numbers), .. } => self.range(true, numbers),
+            AxisForm { geomspace: Some(numbers), .. } => self.range("geomspace", numbers),
             AxisForm { expr: Some(text), .. } => Ok(Written::Computed { scale: self.scale, text: text.clone() }),
             AxisForm { sobol: Some(numbers), .. } => self.sample(form.seed, Design::Sobol, numbers),
             AxisForm { lhs: Some(numbers), .. } => self.sample(form.seed, Design::LatinHypercube, numbers),
-            _ => {
-                let expected = "{ linspace = [first, last, count] } or { geomspace = [first, last, count] }";
-                refuse(key, "a table without a range", expected, "add a range, or write a number or a list")
-            }
+            AxisForm { linspace, .. } => self.range("linspace", linspace.as_deref().unwrap_or_default()),
         }
     }
 
-    /// The three numbers of a range or sample. The first two are legal values.
-    fn ends(self, key: &str, names: &str, numbers: &[f64]) -> Result<[f64; 3], SpecError> {
+    /// The two ends of a range or sample at `key`, which are legal values, and its count, from `least` to `most`.
+    fn ends(self, key: &str, numbers: &[f64], least: u64, most: u64) -> Result<(f64, f64, u64), SpecError> {
         let &[first, last, count] = numbers else {
-            return refuse(key, format!("{} values", numbers.len()), names, "give exactly three values");
+            let found = format!("{} values", numbers.len());
+            return refuse(key, found, "[first, last, count]", "give exactly three values");
         };
         for (index, end) in [first, last].into_iter().enumerate() {
-            if key.ends_with("geomspace") && end <= 0.0 && self.legal(end).is_err() {
-                let (found, help) = (
-                    format!("{end:?} is out of range"),
-                    "geomspace takes the first and the last value, not their exponents",
-                );
-                return refuse(format!("{key}[{index}]"), found, "a positive number", help);
+            let key = format!("{key}[{index}]");
+            if end.is_infinite() {
+                return refuse(key, format!("{end:?} is out of range"), "finite ends", "choose values in the range");
             }
-            let legal = if end.is_finite() { self.legal(end) } else { Err("finite ends".to_owned()) };
-            if let Err(legal) = legal {
-                return self.out_of_range(&format!("{key}[{index}]"), end, legal);
-            }
+            self.legal(&key, end)?;
         }
-        Ok([first, last, count])
+        if !(least as f64..=most as f64).contains(&count) || count.fract() != 0.0 {
+            let (found, expected) =
+                (format!("{count} is not a count of values"), format!("a whole number from {least} to {most}"));
+            let help = "the third number is the count of values, not their distance; for one value write the number";
+            return refuse(format!("{key}[2]"), found, expected, help);
+        }
+        Ok((first, last, count as u64))
     }
 
-    fn range(self, geometric: bool, numbers: &[f64]) -> Result<Written, SpecError> {
-        let key = &format!("{}.{}", self.key, if geometric { "geomspace" } else { "linspace" });
-        let [first, last, count] = self.ends(key, "[first, last, count]", numbers)?;
+    fn range(self, form: &str, numbers: &[f64]) -> Result<Written, SpecError> {
+        let key = &format!("{}.{form}", self.key);
         // From 2^53 on a double may differ from the integer in the spec.
-        if !(2.0..9_007_199_254_740_992.0).contains(&count) || count.fract() != 0.0 {
-            let help = match count {
-                1.0 => "for one value write the number itself",
-                _ if count.fract() != 0.0 => "the third number is the count of values, not their distance",
-                _ => "choose a count in the range",
-            };
-            let found = format!("{count} is not a count of values");
-            return refuse(format!("{key}[2]"), found, "a whole number from 2 to 2^53 - 1", help);
-        }
-        if first == last {
-            let help = "for one value write the number itself";
-            return refuse(key.as_str(), "first and last are the same", "a range", help);
-        }
-        let count = count as u64;
+        let (first, last, count) = self.ends(key, numbers, 2, (1 << 53) - 1)?;
+        let geometric = form == "geomspace";
         if geometric && (first == 0.0 || last == 0.0 || (first < 0.0) != (last < 0.0)) {
             let found = format!("from {first:?} to {last:?} passes through zero");
             let help = "use linspace, or a range on one side of zero";
@@ -224,42 +195,32 @@ impl AxisDraft<'_> {
         };
         if spacing < least * (largest.next_up() - largest) {
             let found = format!("{count} values from {first:?} to {last:?}, closer than adjacent doubles");
-            let expected = "values that differ from each other";
-            return refuse(format!("{key}[2]"), found, expected, "take fewer values, or a list");
+            return refuse(
+                format!("{key}[2]"),
+                found,
+                "values that differ from each other",
+                "take fewer values, or a list",
+            );
         }
         // From the isolated legal value to the interval.
         for value in [1, count - 2].map(|index| values.at(index)) {
-            if let Err(legal) = self.legal(value) {
-                let found = format!("a value of the range, {value:?}, is out of range");
-                let help = "begin with the least legal number above 0, or take fewer values";
-                return refuse(key.as_str(), found, legal, help);
-            }
+            self.legal(key, value)?;
         }
         Ok(self.written(values))
     }
 
     fn sample(self, seed: Option<i64>, design: Design, numbers: &[f64]) -> Result<Written, SpecError> {
         let key = &format!("{}.{}", self.key, design.name());
-        let [least, greatest, count] = self.ends(key, "[least, greatest, count]", numbers)?;
-        let most = design.most();
-        if !(1.0..=most as f64).contains(&count) || count.fract() != 0.0 {
-            let (found, expected) =
-                (format!("{count} is not a count of points"), format!("a whole number from 1 to {most}"));
-            return refuse(format!("{key}[2]"), found, expected, "choose a count in the range");
-        }
+        let (least, greatest, count) = self.ends(key, numbers, 1, design.most())?;
         if least >= greatest {
-            let (found, expected) =
-                (format!("from {least:?} to {greatest:?}"), "the least value first, below the greatest");
-            return refuse(key.as_str(), found, expected, "correct the values");
+            let found = format!("from {least:?} to {greatest:?}");
+            return refuse(key.as_str(), found, "the least value first, below the greatest", "correct the values");
         }
-        let seed = seed.map(|seed| {
-            u32::try_from(seed).or_else(|_| {
-                let (found, expected) = (format!("{seed} is out of range"), "a whole number from 0 to 2^32 - 1");
-                refuse(format!("{}.seed", self.key), found, expected, "choose another seed")
-            })
-        });
-        let (scale, seed) = (self.scale, seed.transpose()?);
-        Ok(Written::Sampled(Sampled { scale, design, least, greatest, count: count as u64, seed }))
+        let seed = seed.map(u32::try_from).transpose().or_else(|_| {
+            let key = format!("{}.seed", self.key);
+            refuse(key, "the seed is out of range", "a whole number from 0 to 2^32 - 1", "choose another seed")
+        })?;
+        Ok(Written::Sampled(Sampled { scale: self.scale, design, least, greatest, count, seed }))
     }
 }
 

@@ -1,17 +1,15 @@
-//! The checked sweep: grid, tables and columns of a legal spec, or its faults.
+//! The checked sweep: grid, tables and columns of a legal spec, or its first fault.
 
 use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use super::block::{self, Checked, too_many};
-use super::error::{Faults, SpecError, refuse, unknown};
-use super::friction;
+use super::block::{self, too_many};
+use super::error::{SpecError, refuse, unknown};
 use super::laws;
-use super::read;
-use super::spec::{Spec, TableSpec};
-use super::units::{UNIT_KEYS, doubtful_axes, doubtful_scales, units};
+use super::spec::{BlockSpec, Spec, TableSpec};
+use super::units::{doubtful_axis, doubtful_scales, units};
 use crate::file;
 use crate::grid::{Axis, Block, Factor, Grid, Quantity, RTOL, RowIndex, Scale, TooMany, Values};
 use crate::model::{Friction, Units};
@@ -91,31 +89,23 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// The faults of the file or spec, with their lines.
+    /// The fault of the file or spec, with its line.
     pub fn load(path: &Path) -> Result<Sweep, SpecError> {
-        let fault = |found: String, expected: &str, help: &str| SpecError::new("", found, expected, help).of(path);
-        let mut bytes = Vec::new();
-        let read = file::open(path).and_then(|file| file.take(MAX_SPEC_BYTES + 1).read_to_end(&mut bytes));
-        read.map_err(|error| match error.kind() {
-            io::ErrorKind::InvalidInput => {
-                fault(error.to_string(), "a TOML file", "write the spec to a file, and name that file")
-            }
-            kind => {
-                let hint = path_hint(path, ".toml");
-                let help = if kind == io::ErrorKind::NotFound { &hint } else { "check its permissions" };
-                fault(format!("cannot read: {error}"), "a readable TOML file", help)
-            }
+        let mut text = String::new();
+        let read = file::open(path).and_then(|file| file.take(MAX_SPEC_BYTES + 1).read_to_string(&mut text));
+        read.map_err(|error| {
+            let help = match error.kind() {
+                io::ErrorKind::NotFound => path_hint(path, ".toml"),
+                io::ErrorKind::InvalidData => "save it as UTF-8 in the editor".to_owned(),
+                _ => "name a readable file".to_owned(),
+            };
+            SpecError::new("", format!("cannot read: {error}"), "a readable TOML file", help).of(path)
         })?;
-        if bytes.len() as u64 > MAX_SPEC_BYTES {
+        if text.len() as u64 > MAX_SPEC_BYTES {
             let expected = format!("a spec of at most {MAX_SPEC_BYTES} bytes");
-            return Err(fault("too long".to_owned(), &expected, "write lists of values as a file of `points`"));
+            let help = "write lists of values as a file of `points`";
+            return Err(SpecError::new("", "too long", expected, help).of(path));
         }
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let (start, bytes) = (error.utf8_error().valid_up_to(), error.as_bytes());
-            let line = 1 + bytes[..start].iter().filter(|&&byte| byte == b'\n').count();
-            let found = format!("not UTF-8: the byte 0x{:02x}", bytes.get(start).copied().unwrap_or_default());
-            SpecError { line: Some(line), ..fault(found, "a spec in UTF-8", "save as UTF-8 in the editor") }
-        })?;
         Sweep::parse_at(&text, path)
     }
 
@@ -131,67 +121,52 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// The faults of the spec, with their lines.
+    /// The fault of the spec, with its line.
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        let mut faults = Faults::default();
-        let spec = read::read(text, &mut faults)?;
-        Sweep::checked(&spec, text, folder, faults)
+        Sweep::check(&Spec::parse(text)?, text, folder)
     }
 
     /// Checks `spec`, read from `text`; files that it names are relative to `folder`.
     ///
     /// # Errors
     ///
-    /// The faults of the spec, with their lines.
+    /// The fault of the spec, with its line.
     pub fn check(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        Sweep::checked(spec, text, folder, Faults::default())
+        Sweep::checked(spec, text, folder).map_err(|fault| fault.located(text))
     }
 
-    /// Checks `spec`; `faults` are those found on reading.
-    fn checked(spec: &Spec, text: &str, folder: &Path, mut faults: Faults) -> Result<Sweep, SpecError> {
-        faults.take(check_name(&spec.name));
-        let is_any_wrong = UNIT_KEYS.iter().any(|key| faults.concern(&format!("model.{key}")));
-        let units = if is_any_wrong { None } else { faults.take(units(&spec.model)) };
-        faults.take(check_rtol("accuracy.rtol", spec.accuracy.rtol));
-        let friction = faults.take(friction::friction(&spec.model)).unwrap_or_default();
-        let mut blocks = blocks(spec, units.as_ref(), folder, &mut faults);
-        let tables = tables(spec, friction, &mut blocks, &mut faults);
-        faults.finish(text)?;
-
-        // Every key is legal by itself.
-        let prefixes: Vec<String> = blocks.iter().map(|block| block.prefix.clone()).collect();
-        let blocks = blocks.into_iter().filter_map(|block| block.block).map(Arc::new).collect();
-        let grid = Grid { blocks, units: units.unwrap_or_default() };
-        let placed = |fault| {
-            let mut faults = [fault];
-            read::find_lines(text, &mut faults);
-            let [fault] = faults;
-            fault
-        };
-        let requests = tables.into_iter().map(|table| request(table, &grid, &prefixes).map_err(placed));
-        let requests = requests.collect::<Result<Vec<Request>, _>>()?;
-        let optimum_rows = optimum_rows(&grid, &requests);
-        let mut warnings = doubtful_scales(&spec.model);
-        warnings.extend(unused(spec, &grid, &requests));
-        for (prefix, block) in prefixes.iter().zip(&grid.blocks) {
-            let axes = block.factors.iter().flat_map(|factor| &factor.axes);
-            // A condition may drop the points outside.
-            if block.condition.is_none() {
-                warnings.extend(doubtful_axes(prefix, &grid.units, axes));
-            }
+    fn checked(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
+        check_name(&spec.name)?;
+        let units = units(&spec.model)?;
+        check_rtol("accuracy.rtol", spec.accuracy.rtol)?;
+        let friction = laws::friction(&spec.model)?;
+        let blocks = blocks(spec, &units, folder)?;
+        let grid = Grid { blocks: blocks.into_iter().map(Arc::new).collect(), units };
+        if spec.tables.is_empty() {
+            let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
+            return refuse("tables", "no table is requested", expected, "add a line such as [tables.optimal]");
         }
-        read::find_lines(text, &mut warnings);
+        let requests = spec.tables.iter().map(|(name, table)| request(name, table, spec, friction, &grid));
+        let requests = requests.collect::<Result<Vec<Request>, _>>()?;
+        let warnings = doubtful_scales(&spec.model).into_iter().chain(unused(spec, &grid, &requests));
+        // A condition may drop the points outside.
+        let unconditional = spec.blocks().zip(&grid.blocks).filter(|(_, block)| block.condition.is_none());
+        let axes = unconditional.flat_map(|((prefix, _), block)| {
+            let axes = block.factors.iter().flat_map(|factor| &factor.axes);
+            axes.map(move |axis| (format!("{prefix}axes.{}", axis.quantity.name()), axis))
+        });
+        let warnings = warnings.chain(axes.filter_map(|(key, axis)| doubtful_axis(key, &grid.units, axis)));
         Ok(Sweep {
             name: spec.name.clone(),
             description: spec.description.clone(),
             text: text.to_owned(),
             folder: folder.to_owned(),
-            grid,
             bounded: spec.model.velocity_bound && friction == Friction::Log,
             friction,
+            optimum_rows: optimum_rows(&grid, &requests),
+            warnings: warnings.map(|warning| warning.located(text)).collect(),
             requests,
-            optimum_rows,
-            warnings,
+            grid,
         })
     }
 
@@ -230,51 +205,47 @@ impl Sweep {
 }
 
 impl Request {
+    /// The request of `table` over `row_index`, rows of `grid`.
+    pub(super) fn new(
+        table: &'static Table,
+        projection: Projection,
+        rtol: f64,
+        row_index: RowIndex,
+        members: Option<RowIndex>,
+        grid: &Grid,
+    ) -> Request {
+        let sizes = projection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
+        Request { table, projection, rtol, rows: row_index.rows(), row_index, members, hash: OnceLock::new(), sizes }
+    }
+
     /// Whether the table needs optimal protocols that are shared.
     pub fn needs_optimum(&self, grid: &Grid) -> bool {
         grid.blocks.iter().any(|block| self.table.needs_optimum(&self.projection, block))
     }
-
-    /// Whether it has numbers of an optimum that knows nothing of the axis `quantity`.
-    fn compares_without(&self, quantity: Quantity) -> bool {
-        let mut names = self.projection.indices().iter().map(|&column| self.table.columns()[column].name);
-        let is_of_optimum = |name: &str| name == "work_optimal" || name.starts_with("gap");
-        !self.table.axes().contains(&quantity) && (self.table.name() == "crossover" || names.any(is_of_optimum))
-    }
 }
 
-/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads, and on ceilings of which the optimum of
-/// a table knows nothing.
+/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads.
 fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
-    let tables = |request: &Request| [Some(request.table), request.members.as_ref().and_then(|_| table::find("gap"))];
-    let tables: Vec<&Table> = requests.iter().flat_map(tables).flatten().collect();
+    let gap = |request: &Request| request.members.as_ref().and_then(|_| table::find("gap"));
+    let tables: Vec<&Table> =
+        requests.iter().flat_map(|request| [Some(request.table), gap(request)]).flatten().collect();
     // The best shortcut has the units of these axes.
     let has_best = tables.iter().any(|table| table.name() == "best_cubic");
-    let of_table = |quantity: Quantity| tables.iter().any(|table| table.axes().contains(&quantity));
     let mut warnings = Vec::new();
     for ((prefix, written), block) in spec.blocks().zip(&grid.blocks) {
         let expressions = block.derived.iter().map(|derived| &derived.expression).chain(&block.condition);
         let read: Vec<Quantity> = expressions.flat_map(|expression| expression.reads()).collect();
         for quantity in written.axes.keys().filter_map(|name| Quantity::from_name(name)) {
-            let others = table::ALL.into_iter().filter(|table| table.axes().contains(&quantity));
-            let others = others.map(|table| table.name()).collect::<Vec<_>>().join(", ");
-            let is_ceiling = matches!(quantity, Quantity::VelocityCeiling | Quantity::FrictionCeiling);
-            let is_used = of_table(quantity) || read.contains(&quantity) || (has_best && quantity.has_scale());
-            let (names, expected, help): (Vec<&str>, _, _) = if !is_used {
-                let help = format!("remove it, or add a table that has it: {others}");
-                (tables.iter().map(|table| table.name()).collect(), "an axis of a requested table".to_owned(), help)
-            } else if is_ceiling && block.may_be(quantity, f64::is_finite) {
-                let free = requests.iter().filter(|request| request.compares_without(quantity));
-                let help = format!("compare their optimum with rows of the others where {} = inf", quantity.name());
-                (free.map(|request| request.table.name()).collect(), format!("tables that have it: {others}"), help)
-            } else {
+            let has = |table: &Table| table.axes().contains(&quantity);
+            if tables.iter().any(|table| has(table)) || read.contains(&quantity) || has_best && quantity.has_scale() {
                 continue;
-            };
-            if !names.is_empty() {
-                let (key, found) =
-                    (format!("{prefix}axes.{}", quantity.name()), format!("no effect on {}", names.join(", ")));
-                warnings.push(SpecError::new(key, found, expected, help));
             }
+            let names = |tables: &[&Table]| tables.iter().map(|table| table.name()).collect::<Vec<_>>().join(", ");
+            let others: Vec<&Table> = table::ALL.into_iter().filter(|table| has(table)).collect();
+            let help = format!("remove it, or add a table that has it: {}", names(&others));
+            let (key, found) =
+                (format!("{prefix}axes.{}", quantity.name()), format!("no effect on {}", names(&tables)));
+            warnings.push(SpecError::new(key, found, "an axis of a requested table", help));
         }
     }
     warnings
@@ -310,49 +281,42 @@ pub fn check_name(name: &str) -> Result<(), SpecError> {
 }
 
 /// The blocks of `spec`.
-fn blocks(spec: &Spec, units: Option<&Units>, folder: &Path, faults: &mut Faults) -> Vec<Checked> {
-    let top = &spec.top;
-    let outside = [
-        ("axes", !top.axes.is_empty()),
-        ("points", top.points.is_some()),
-        ("zip", !top.zip.is_empty()),
-        ("where", top.condition.is_some()),
-    ];
-    for (key, _) in outside.into_iter().filter(|(_, is_there)| *is_there && !spec.block.is_empty()) {
-        let (found, expected) =
-            (format!("`{key}` outside of the blocks"), "everything about the grid in [[block]]s, or no block");
-        faults.push(SpecError::new(key, found, expected, "move it into the blocks that it concerns"));
+fn blocks(spec: &Spec, units: &Units, folder: &Path) -> Result<Vec<Block>, SpecError> {
+    if !spec.block.is_empty() && spec.top != BlockSpec::default() {
+        let help = "move axes, points, zip and where into the blocks that they concern";
+        return refuse(
+            "block",
+            "keys of the grid outside of the blocks",
+            "the whole grid in [[block]]s, or no block",
+            help,
+        );
     }
-    let mut blocks: Vec<Checked> =
-        spec.blocks().map(|(prefix, one)| block::check(one, prefix, units, folder, faults)).collect();
-    complete(&mut blocks);
+    let checked = spec.blocks().map(|(prefix, one)| block::check(one, &prefix, units, folder));
+    let mut blocks = checked.collect::<Result<Vec<Block>, _>>()?;
     for quantity in Quantity::ALL {
-        let scale = |checked: &Checked| checked.block.as_ref()?.scale(quantity);
-        let mut scales = blocks.iter().enumerate().filter_map(|(number, block)| Some((number, scale(block)?)));
-        let Some((first, usual)) = scales.next() else { continue };
-        if let Some((number, scale)) = scales.find(|(_, scale)| *scale != usual) {
-            let (key, units) =
-                (format!("block[{number}].axes.{}", quantity.name()), [scale, usual].map(|scale| quantity.unit(scale)));
-            let found = format!("in units of \"{}\", but \"{}\" in block[{first}]", units[0], units[1]);
-            let help = "convert the values of one of them";
-            faults.push(SpecError::new(key, found, "one unit, since all blocks share a column", help));
+        let Some((first, usual)) = blocks.iter().enumerate().find_map(|(at, block)| Some((at, block.scale(quantity)?)))
+        else {
+            continue;
+        };
+        for (number, block) in blocks.iter_mut().enumerate() {
+            match block.scale(quantity) {
+                Some(scale) if scale != usual => {
+                    let key = format!("block[{number}].axes.{}", quantity.name());
+                    let [scale, usual] = [scale, usual].map(|scale| quantity.unit(scale));
+                    let found = format!("in units of \"{scale}\", but \"{usual}\" in block[{first}]");
+                    let expected = "one unit, since all blocks share a column";
+                    return refuse(key, found, expected, "convert the values of one of them");
+                }
+                // All blocks share the column of a tacit axis.
+                None if quantity.is_tacit() => {
+                    let axis = Axis { quantity, scale: Scale::Model, values: Values::List(quantity.default()) };
+                    block.factors.push(Factor { axes: vec![axis], ..Factor::default() });
+                }
+                _ => {}
+            }
         }
     }
-    blocks
-}
-
-/// Adds the default of a tacit axis to the other blocks if one block names it: all blocks share the column.
-fn complete(blocks: &mut [Checked]) {
-    for quantity in Quantity::ALL.into_iter().filter(|quantity| quantity.is_tacit()) {
-        let (with, without): (Vec<_>, Vec<_>) = blocks
-            .iter_mut()
-            .filter_map(|checked| checked.block.as_mut())
-            .partition(|block| block.scale(quantity).is_some());
-        for block in without.into_iter().filter(|_| !with.is_empty()) {
-            let axis = Axis { quantity, scale: Scale::Model, values: Values::List(quantity.default()) };
-            block.factors.push(Factor { axes: vec![axis], ..Factor::default() });
-        }
-    }
+    Ok(blocks)
 }
 
 pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
@@ -362,89 +326,68 @@ pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     refuse(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range")
 }
 
-/// A table of a spec with legal keys.
-struct TableDraft {
-    /// Its name in the spec.
-    name: String,
-    /// The table with the rows.
-    written: &'static Table,
-    /// The table to write: this table or its reduction.
-    table: &'static Table,
-    projection: Projection,
-    rtol: f64,
-}
-
-/// The tables of `spec`. A missing axis is reported once.
-fn tables(spec: &Spec, friction: Friction, blocks: &mut [Checked], faults: &mut Faults) -> Vec<TableDraft> {
-    if spec.tables.is_empty() && !faults.concern("tables") {
-        let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
-        faults.push(SpecError::new("tables", "no table is requested", expected, "add a line such as [tables.optimal]"));
-    }
-    let model = (spec.accuracy.rtol, spec.model.velocity_bound, friction);
-    spec.tables.iter().filter_map(|(name, table)| draft(name, table, model, blocks, faults)).collect()
-}
-
-fn draft(
+/// The table `name` of `spec`, requested as `table_spec`, over its rows of `grid`.
+fn request(
     name: &str,
-    spec: &TableSpec,
-    (rtol, is_bounded, friction): (f64, bool, Friction),
-    blocks: &mut [Checked],
-    faults: &mut Faults,
-) -> Option<TableDraft> {
+    table_spec: &TableSpec,
+    spec: &Spec,
+    friction: Friction,
+    grid: &Grid,
+) -> Result<Request, SpecError> {
     let key = format!("tables.{name}");
     let Some(written) = table::ALL.into_iter().find(|table| table.name() == name) else {
-        faults.push(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
-        return None;
+        return Err(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
     };
-    let is_reduction_known = !faults.concern(&format!("{key}.reduce"));
-    let has_ceiling = |block: &Block| block.may_be(Quantity::VelocityCeiling, f64::is_finite);
-    let has_ceiling = blocks.iter().filter_map(|block| block.block.as_ref()).any(has_ceiling);
-    let has_laws = has_ceiling || blocks.iter().any(|block| block.held.contains(&Quantity::Law));
+    let has_ceiling = grid.blocks.iter().any(|block| block.may_be(Quantity::VelocityCeiling, f64::is_finite));
+    let has_laws = has_ceiling || grid.blocks.iter().any(|block| block.scale(Quantity::Law).is_some());
     // A reduced table is one of ageing, without ceilings.
-    let written = table::over(written, has_laws && spec.reduce.is_none());
-    if has_ceiling && spec.reduce.is_some() {
+    let written = table::over(written, has_laws && table_spec.reduce.is_none());
+    if has_ceiling && table_spec.reduce.is_some() {
         let (found, help) = ("a reduction supports no velocity ceiling", "remove the axis v_ceiling, or this key");
-        faults.push(SpecError::new(format!("{key}.reduce"), found, "no v_ceiling", help));
+        return refuse(format!("{key}.reduce"), found, "no v_ceiling", help);
     }
-    let table = faults.take(reduced(written, &key, spec.reduce.as_deref()));
-    for block in blocks {
-        if let Some(grid) = &block.block {
-            faults.take(laws::check(&key, table.unwrap_or(written), grid, &block.prefix, is_bounded));
-            faults.take(friction::check(&key, written, spec.columns.as_deref(), grid, friction));
+    let table = reduced(written, &key, table_spec.reduce.as_deref())?;
+    let columns = table_spec.columns.as_deref();
+    for ((prefix, _), block) in spec.blocks().zip(&grid.blocks) {
+        laws::check(&key, table, block, spec.model.velocity_bound)?;
+        if friction == Friction::Regularised {
+            laws::check_regularised(&key, written, columns, block)?;
         }
-        let is_missing = |axis: &Quantity| !axis.is_tacit() && !block.held.contains(axis);
-        let missing: Vec<Quantity> = written.axes().iter().copied().filter(is_missing).collect();
+        let is_missing = |axis: &&Quantity| !axis.is_tacit() && block.scale(**axis).is_none();
+        let missing: Vec<&str> = written.axes().iter().filter(is_missing).map(|axis| axis.name()).collect();
         if !missing.is_empty() {
-            faults.push(lacks(&key, written, &block.prefix, &missing));
-            block.held.extend(missing);
+            let place = if prefix.is_empty() { "the spec" } else { prefix.trim_end_matches('.') };
+            let found = format!("needs {}, which {place} does not have", missing.join(", "));
+            let help = format!("add {} = ... to its axes, or remove the table", missing.join(" = ..., "));
+            return refuse(key, found, expected_axes(written.axes()), help);
         }
     }
-    let table = table?;
-    let rtol = spec.rtol.or(table.default_rtol()).unwrap_or(rtol);
-    if spec.rtol.is_some() {
-        faults.take(check_rtol(&format!("{key}.rtol"), rtol));
+    let rtol = table_spec.rtol.or(table.default_rtol()).unwrap_or(spec.accuracy.rtol);
+    check_rtol(&format!("{key}.rtol"), rtol)?;
+    let projection = projection(table, &key, columns)?;
+
+    let members = if written.name() == table.name() { None } else { Some(members(written, table, &key, grid)?) };
+    let prefix = |block: usize| spec.blocks().nth(block).map_or_else(String::new, |(prefix, _)| prefix);
+    let row_index = grid.project(table.axes()).map_err(|error| match error {
+        TooMany::Rows => too_many_rows(key),
+        TooMany::Combinations(block) => too_many(format!("{}where", prefix(block))),
+    })?;
+    if let Some(empty) = row_index.blocks().iter().position(|block_rows| block_rows.rows() == 0) {
+        let help = "correct the condition, or the axes in it; a computed axis that is NaN meets no condition";
+        return refuse(
+            format!("{}where", prefix(empty)),
+            "matches no points",
+            "a condition that some point meets",
+            help,
+        );
     }
-    // The columns are those of the reduced table.
-    let projection = projection(table, &key, spec.columns.as_deref().filter(|_| is_reduction_known), faults);
-    Some(TableDraft { name: name.to_owned(), written, table, projection, rtol })
+    Ok(Request::new(table, projection, rtol, row_index, members, grid))
 }
 
-/// The fault of a table that lacks axes in the block of `prefix`.
-fn lacks(key: &str, table: &Table, prefix: &str, missing: &[Quantity]) -> SpecError {
-    let (place, axes) = match prefix.trim_end_matches('.') {
-        "" => ("the spec", "[axes]"),
-        block => (block, "its [block.axes]"),
-    };
-    let names: Vec<String> = missing.iter().map(|axis| format!("`{}`", axis.name())).collect();
-    let lines: Vec<String> = missing.iter().map(|axis| format!("`{} = ...`", axis.name())).collect();
-    let noun = if missing.len() == 1 { "axis" } else { "axes" };
-    let found = format!("needs the {noun} {}, which {place} does not have", names.join(", "));
-    SpecError::new(
-        key,
-        found,
-        expected_axes(table.axes()),
-        format!("add {} to {axes}, or remove the table", lines.join(", ")),
-    )
+/// The fault of a table at `key` with too many rows.
+pub(super) fn too_many_rows(key: String) -> SpecError {
+    let help = "take fewer values on its axes";
+    SpecError::new(key, "more rows than 64 bits can count", "at most 2^64 - 1 rows", help)
 }
 
 /// The words for the axes that a table takes.
@@ -453,30 +396,6 @@ pub(super) fn expected_axes(axes: &[Quantity]) -> String {
     let listed = |axes: &[Quantity]| axes.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
     let optional = if optional.is_empty() { String::new() } else { format!("; optional: {}", listed(&optional)) };
     format!("axes {}{optional}", listed(&required))
-}
-
-/// A table over its rows of `grid`, whose blocks have keys that begin with `prefixes`.
-fn request(draft: TableDraft, grid: &Grid, prefixes: &[String]) -> Result<Request, SpecError> {
-    let TableDraft { name, written, table, projection, rtol } = draft;
-    let key = format!("tables.{name}");
-    let members = if written.name() == table.name() { None } else { Some(members(written, table, &key, grid)?) };
-    let row_index = grid.project(table.axes()).map_err(|error| match error {
-        TooMany::Rows => {
-            let (found, help) = ("more rows than 64 bits can count", "take fewer values on its axes");
-            SpecError::new(key, found, "at most 2^64 - 1 rows", help)
-        }
-        TooMany::Combinations(block) => too_many(format!("{}where", prefixes[block])),
-    })?;
-    if let Some(empty) = row_index.blocks().iter().position(|block_rows| block_rows.rows() == 0) {
-        let help = block::nan(&grid.blocks[empty])
-            .map_or("correct the condition, or the axes in it".to_owned(), |nan| {
-                format!("correct the expression of {nan}, which meets no condition")
-            });
-        let key = format!("{}where", prefixes[empty]);
-        return refuse(key, "matches no points", "a condition that some point meets", help);
-    }
-    let sizes = projection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
-    Ok(Request { table, projection, rtol, rows: row_index.rows(), row_index, members, hash: OnceLock::new(), sizes })
 }
 
 /// The reduction of `table` that the key `reduce` names, or `table`.
@@ -503,17 +422,13 @@ fn members(landscape: &Table, reduced: &Table, key: &str, grid: &Grid) -> Result
         return Err(wrong("a grid of several blocks", "write one spec per block"));
     };
     let is_fast = |factor: &Factor| factor.holds_any(&fast);
+    let expressions = block.derived.iter().map(|derived| &derived.expression).chain(&block.condition);
     if block.factors.iter().any(|factor| is_fast(factor) && factor.axes.len() > 1)
         || fast.iter().any(|axis| block.axis(*axis).is_none())
+        || expressions.flat_map(|expression| expression.reads()).any(|axis| fast.contains(&axis))
     {
-        return Err(wrong("alpha_2 or alpha_3 varies together with another axis", "give it values of its own"));
-    }
-    let expressions = block.derived.iter().map(|derived| &derived.expression).chain(&block.condition);
-    if expressions.flat_map(|expression| expression.reads()).any(|axis| fast.contains(&axis)) {
-        return Err(wrong(
-            "another axis or `where` depends on alpha_2 or alpha_3",
-            "remove that dependence, or filter the full table",
-        ));
+        let found = "alpha_2 or alpha_3 depends on another axis, or another axis or `where` on it";
+        return Err(wrong(found, "remove that dependence, or filter the full table"));
     }
     let (last, first): (Vec<Factor>, Vec<Factor>) = block.factors.iter().cloned().partition(is_fast);
     let each = last.iter().map(Factor::len).fold(1, u64::saturating_mul);
@@ -529,29 +444,26 @@ fn members(landscape: &Table, reduced: &Table, key: &str, grid: &Grid) -> Result
 }
 
 /// The columns with these names, or the default ones.
-pub(super) fn projection(table: &Table, key: &str, names: Option<&[String]>, faults: &mut Faults) -> Projection {
+pub(super) fn projection(table: &Table, key: &str, names: Option<&[String]>) -> Result<Projection, SpecError> {
     let known: Vec<&str> = table.columns().iter().map(|column| column.name).collect();
     let Some(names) = names else {
-        return Projection::usual(table.columns());
+        return Ok(Projection::usual(table.columns()));
     };
     let mut indices = Vec::new();
-    for (place, name) in names.iter().enumerate() {
+    for (place, name) in names.iter().enumerate().filter(|(_, name)| *name != STATUS) {
         let key = format!("{key}.columns[{place}]");
         match known.iter().position(|column| column == name) {
-            _ if name == STATUS => {}
             Some(index) if indices.contains(&index) => {
-                let found = format!("`{name}` is a duplicate");
-                faults.push(SpecError::new(key, found, "each column once", "remove one of the two"));
+                return refuse(key, format!("`{name}` is a duplicate"), "each column once", "remove one of the two");
             }
             Some(index) => indices.push(index),
-            None => faults.push(unknown(key, "column", name, &known)),
+            None => return Err(unknown(key, "column", name, &known)),
         }
     }
-    let key = format!("{key}.columns");
-    if indices.is_empty() && !faults.concern(&key) {
+    if indices.is_empty() {
         let expected = format!("at least one of {}", known.join(", "));
         let help = "name columns, or remove `columns` for the default ones";
-        faults.push(SpecError::new(key, "no column is requested", expected, help));
+        return refuse(format!("{key}.columns"), "no column is requested", expected, help);
     }
-    Projection::new(indices)
+    Ok(Projection::new(indices))
 }

@@ -1,17 +1,16 @@
 //! A table over values in memory: a sweep without a spec, and the rows of a table without a file.
 
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use arrow_array::RecordBatch;
 use arrow_schema::ArrowError;
 
 use super::check::{self, Request, Sweep};
-use super::error::{Faults, SpecError, refuse};
-use super::friction;
+use super::error::{SpecError, refuse};
 use super::laws;
 use super::spec::{AccuracySpec, ModelSpec};
-use super::units::{doubtful_axes, help, legal, units};
+use super::units::{doubtful_axis, help, legal, units};
 use crate::dataset::{Layout, batch};
 use crate::grid::{Axis, Block, Factor, Grid, Quantity, Scale, Values};
 use crate::model::{Friction, Units};
@@ -56,7 +55,7 @@ pub enum RowsError {
 const MAX_UNCHECKED_BYTES: u64 = 1 << 28;
 
 /// Bytes of memory that the system would give without swapping; `None` if it does not say.
-fn available_bytes() -> Option<u64> {
+pub(crate) fn available_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     Some(1024 * line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
@@ -67,7 +66,7 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// The faults of the values, as in a spec.
+    /// The fault of a value, as in a spec.
     pub fn direct(direct: Direct<'_>) -> Result<Sweep, SpecError> {
         let is_of_laws = |(axis, values): &(Quantity, Vec<f64>)| match axis {
             Quantity::Law => true,
@@ -82,29 +81,24 @@ impl Sweep {
         };
         direct.points.retain(takes);
         direct.grid.retain(takes);
-        let mut faults = Faults::default();
-        let units = faults.take(units(&direct.model));
+        let units = units(&direct.model)?;
         let rtol = direct.rtol.or(direct.table.default_rtol()).unwrap_or_else(|| AccuracySpec::default().rtol);
-        faults.take(check::check_rtol("rtol", rtol));
-        let projection = check::projection(direct.table, direct.table.name(), direct.columns, &mut faults);
-        let units = units.unwrap_or_default();
-        direct.check(&units, &mut faults);
-        faults.finish("")?;
-        let friction = friction::friction(&direct.model)?;
+        check::check_rtol("rtol", rtol)?;
+        let projection = check::projection(direct.table, direct.table.name(), direct.columns)?;
+        direct.check(&units)?;
+        let friction = laws::friction(&direct.model)?;
         let (table, columns, has_floor) = (direct.table, direct.columns, direct.model.velocity_bound);
         let block = direct.block();
-        laws::check("law", table, &block, "", has_floor)?;
-        friction::check("friction", table, columns, &block, friction)?;
+        laws::check("law", table, &block, has_floor)?;
+        if friction == Friction::Regularised {
+            laws::check_regularised("friction", table, columns, &block)?;
+        }
         let grid = Grid { blocks: vec![Arc::new(block)], units };
-        let row_index = grid.project(table.axes()).or_else(|_| {
-            let help = "take fewer values in `grid`";
-            refuse(table.name(), "more rows than 64 bits can count", "at most 2^64 - 1 rows", help)
-        })?;
+        let row_index = grid.project(table.axes()).map_err(|_| check::too_many_rows(table.name().to_owned()))?;
         let axes = grid.blocks.iter().flat_map(|block| &block.factors).flat_map(|factor| &factor.axes);
-        let warnings = doubtful_axes("", &grid.units, axes);
-        let sizes = projection.indices().iter().map(|&column| table.columns()[column].size(&grid)).collect();
-        let (rows, hash) = (row_index.rows(), OnceLock::new());
-        let request = Request { table, projection, rtol, rows, row_index, members: None, hash, sizes };
+        let warnings =
+            axes.filter_map(|axis| doubtful_axis(axis.quantity.name().to_owned(), &grid.units, axis)).collect();
+        let request = Request::new(table, projection, rtol, row_index, None, &grid);
         Ok(Sweep {
             name: table.name().to_owned(),
             description: String::new(),
@@ -164,39 +158,32 @@ impl Direct<'_> {
     }
 
     /// Checks that the table has these axes and no value is missing or out of range.
-    fn check(&self, units: &Units, faults: &mut Faults) {
+    fn check(&self, units: &Units) -> Result<(), SpecError> {
         let (name, takes) = (self.table.name(), self.table.axes());
-        let names = takes.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
         let given = || self.points.iter().chain(&self.grid);
         for (place, (quantity, values)) in given().enumerate() {
-            let (key, is_known) = (quantity.name(), takes.contains(quantity));
-            if !is_known {
-                faults.push(SpecError::new(key, format!("`{name}` has no such axis"), names.as_str(), "remove it"));
-            } else if given().take(place).any(|(other, _)| other == quantity) {
-                let found = "an argument and an axis of `grid`";
-                faults.push(SpecError::new(key, found, "each axis once", "remove one of the two"));
-            } else {
-                faults.take(self.check_values(units, *quantity, values));
+            let key = quantity.name();
+            if !takes.contains(quantity) {
+                return refuse(key, format!("`{name}` has no such axis"), check::expected_axes(takes), "remove it");
+            }
+            if given().take(place).any(|(other, _)| other == quantity) {
+                return refuse(key, "an argument and an axis of `grid`", "each axis once", "remove one of the two");
+            }
+            for (place, &value) in values.iter().enumerate() {
+                if let Err(expected) = legal(units, *quantity, self.scale_of(*quantity), value) {
+                    let key = if values.len() == 1 { key.to_owned() } else { format!("{key}[{place}]") };
+                    return refuse(key, format!("{value:?} is out of range"), expected, help(units, *quantity, value));
+                }
             }
         }
         let is_missing = |axis: &&Quantity| axis.default().is_empty() && !given().any(|(given, _)| given == *axis);
         let missing: Vec<&str> = takes.iter().filter(is_missing).map(|axis| axis.name()).collect();
-        if !missing.is_empty() {
-            let (found, help) =
-                (format!("`{name}` needs {}", missing.join(", ")), format!("add {}=...", missing.join("=..., ")));
-            faults.push(SpecError::new("", found, check::expected_axes(takes), help));
+        if missing.is_empty() {
+            return Ok(());
         }
-    }
-
-    fn check_values(&self, units: &Units, quantity: Quantity, values: &[f64]) -> Result<(), SpecError> {
-        for (place, &value) in values.iter().enumerate() {
-            if let Err(expected) = legal(units, quantity, self.scale_of(quantity), value) {
-                let name = quantity.name().to_owned();
-                let key = if values.len() == 1 { name } else { format!("{name}[{place}]") };
-                return refuse(key, format!("{value:?} is out of range"), expected, help(units, quantity, value));
-            }
-        }
-        Ok(())
+        let (found, help) =
+            (format!("`{name}` needs {}", missing.join(", ")), format!("add {}=...", missing.join("=..., ")));
+        refuse("", found, check::expected_axes(takes), help)
     }
 
     /// The factors: points that vary together, constants, axes of the grid, defaults.

@@ -89,7 +89,8 @@ impl Estimates {
 /// Threads that cannot be started, and cells that cannot be encoded.
 pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
-    let sampler = CostSampler::new(sweep, &plan, &pool, MAX_SAMPLE_SECONDS);
+    let sampler =
+        CostSampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool, began: Instant::now() };
     let samples = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
     let budget = SAMPLE_TIME.as_secs_f64() / f64::from(samples);
     let optimum = sampler.optimum(budget);
@@ -104,21 +105,6 @@ pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let (sync, part) = (written(0.0), written(bytes));
     let shared = optimum * plan.optima as f64;
     Ok(Estimates { tables, shared, sync, part, parts })
-}
-
-/// Bytes of each table of `sweep` on disk, from samples of a fifth of the time.
-///
-/// # Errors
-///
-/// Those of [`estimate`].
-pub fn sizes(sweep: &Sweep) -> Result<Vec<f64>, RunError> {
-    let (plan, pool) = (Plan::new(sweep), pool(0)?);
-    let sampler = CostSampler::new(sweep, &plan, &pool, 0.0);
-    let budget = 0.2 * SAMPLE_TIME.as_secs_f64() / sweep.requests.len() as f64;
-    let optima = sweep.optimum_cache();
-    let tables =
-        sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, 0.0, budget));
-    tables.map(|table| table.map(|table| table.bytes)).collect()
 }
 
 /// The cost of ranges of one length.
@@ -189,15 +175,9 @@ struct CostSampler<'a> {
     manifest: Manifest,
     pool: &'a ThreadPool,
     began: Instant,
-    /// Seconds after which no sample is extended because its rows differ.
-    patience: f64,
 }
 
-impl<'a> CostSampler<'a> {
-    fn new(sweep: &'a Sweep, plan: &'a Plan, pool: &'a ThreadPool, patience: f64) -> CostSampler<'a> {
-        CostSampler { sweep, plan, manifest: plan.manifest(sweep), pool, began: Instant::now(), patience }
-    }
-
+impl CostSampler<'_> {
     /// The cost of a table if a shared optimal protocol costs `optimum`, from samples that take about `budget` seconds, more if rows differ.
     fn table(&self, request: &Request, optima: &OptimumCache, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
         let signal = Signal::default();
@@ -266,7 +246,7 @@ impl TableSampler<'_> {
         }
         let (length, sample) = shortest(&samples).unwrap_or((*longest, *long));
         let all = self.extended(sample, length, rows / length, |sample| {
-            let is_late = self.sampler.began.elapsed().as_secs_f64() > self.sampler.patience;
+            let is_late = self.sampler.began.elapsed().as_secs_f64() > MAX_SAMPLE_SECONDS;
             self.elapsed() > self.budget && (is_late || sample.standard_error(rows) < MAX_STANDARD_ERROR)
         })?;
         let [all_time, all_size, of_all] = all.mean();

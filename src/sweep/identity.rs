@@ -68,27 +68,14 @@ impl Sweep {
     /// The error with the first key in which this spec differs from that of the dataset.
     pub(super) fn explain(&self, error: DatasetError) -> DatasetError {
         let DatasetError::OtherSpec { folder, table, expected, found, spec } = error else { return error };
-        let [mut here, mut there] = [expected, found];
-        match Sweep::parse(&spec, &self.folder) {
-            Ok(other) => match self.difference(&other, &table) {
-                Some(difference) => [here, there] = difference,
-                None => {
-                    here = match read::value(&self.text, "points") {
-                        Some(file) => format!("points = {file}{}", self.at("points")),
-                        None => "the points that it refers to".to_owned(),
-                    };
-                    there = "other contents of the same file".to_owned();
-                }
-            },
-            // The spec of the dataset names files that do not exist here.
-            Err(_) if spec.is_empty() => {}
-            Err(error) => there = format!("a spec that cannot be read from here: {}", error.found),
-        }
-        DatasetError::OtherSpec { folder, table, expected: here, found: there, spec }
+        // The spec of the dataset may name files that do not exist here.
+        let difference = Sweep::parse(&spec, &self.folder).map(|other| self.difference(&other, &table));
+        let [expected, found] = difference.unwrap_or([expected, found]);
+        DatasetError::OtherSpec { folder, table, expected, found, spec }
     }
 
     /// The first key in which two specs differ for a table, with both values and its line in this spec.
-    fn difference(&self, other: &Sweep, table: &str) -> Option<[String; 2]> {
+    fn difference(&self, other: &Sweep, table: &str) -> [String; 2] {
         let facts = |sweep: &Sweep| {
             let mut facts = Vec::new();
             if let Some(request) = sweep.requests.iter().find(|request| request.table.name() == table) {
@@ -100,52 +87,23 @@ impl Sweep {
         let new = here.iter().filter(|fact| !there.contains(fact));
         let lost = there.iter().filter(|fact| !here.contains(fact));
         // An axis is more specific than the order of all axes.
-        let mut keys: Vec<&str> = new.chain(lost).map(|(key, _)| key.as_str()).collect();
-        keys.sort_by_key(|key| is_order(key));
-        keys.into_iter().find_map(|key| {
-            let is_written = |key: &str| [self, other].iter().any(|sweep| read::value(&sweep.text, key).is_some());
-            let name = if key.ends_with(".rtol") && !is_written(key) { "accuracy.rtol" } else { key };
-            let value = |sweep: &Sweep, facts: &[(String, String)]| {
-                let default = || facts.iter().find(|(known, _)| known == key).map(|(_, value)| value.clone());
-                read::value(&sweep.text, name).or_else(|| default().filter(|_| is_order(key) || !key.contains("axes.")))
-            };
-            let missing = || format!("no {name}");
-            match [value(self, &here), value(other, &there)] {
-                [Some(here), Some(there)] => {
-                    let [here, there] = differing([here, there]);
-                    Some([format!("{name} = {here}{}", self.at(name)), format!("{name} = {there}")])
-                }
-                [Some(here), None] => {
-                    Some([format!("{name} = {}{}", shown(&here, MAX_SHOWN_CHARS), self.at(name)), missing()])
-                }
-                [None, Some(there)] => Some([missing(), format!("{name} = {}", shown(&there, MAX_SHOWN_CHARS))]),
-                [None, None] => None,
-            }
-        })
+        let keys = new.chain(lost).map(|(key, _)| key.as_str());
+        let Some(key) = keys.min_by_key(|key| key.ends_with("axes")) else {
+            return ["the files that it names", "other contents of the same files"].map(str::to_owned);
+        };
+        let value = |sweep: &Sweep, facts: &[(String, String)]| {
+            let fact =
+                facts.iter().find(|(known, _)| known == key && !key.contains("axes.")).map(|(_, value)| value.clone());
+            let value = read::value(&sweep.text, key).or(fact);
+            value.map_or_else(|| format!("no {key}"), |value| format!("{key} = {}", shown(&value, MAX_SHOWN_CHARS)))
+        };
+        let [here, there] = [value(self, &here), value(other, &there)];
+        if here == there {
+            return [format!("the values of {key}"), format!("other values of {key}")];
+        }
+        let line = read::line(&self.text, key).filter(|_| !here.starts_with("no "));
+        [line.map_or(here.clone(), |line| format!("{here} (line {line})")), there]
     }
-
-    /// The line of a key in the spec, for a message.
-    fn at(&self, key: &str) -> String {
-        let is_written = is_order(key) || read::value(&self.text, key).is_some();
-        let line = read::line(&self.text, key).filter(|_| is_written);
-        line.map_or_else(String::new, |line| format!(" (line {line})"))
-    }
-}
-
-/// Whether a key is the order of the axes.
-fn is_order(key: &str) -> bool {
-    key == "axes" || key.ends_with("].axes")
-}
-
-/// Two values in a message, long ones from shortly before their difference on.
-fn differing(values: [String; 2]) -> [String; 2] {
-    let same = values[0].chars().zip(values[1].chars()).take_while(|(here, there)| here == there).count();
-    let longest = values.each_ref().map(|value| value.chars().count()).into_iter().fold(0, usize::max);
-    let start = same.saturating_sub(MAX_SHOWN_CHARS / 2).min(longest.saturating_sub(MAX_SHOWN_CHARS));
-    values.map(|value| {
-        let rest: String = value.chars().skip(start).collect();
-        format!("{}{}", if start > 0 { "..." } else { "" }, shown(&rest, MAX_SHOWN_CHARS))
-    })
 }
 
 /// The inputs of a block for the `needed` axes, and for the axes in their expressions and in the condition.

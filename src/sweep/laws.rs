@@ -1,66 +1,101 @@
-//! What the evolution laws of the state demand of a spec: tables that know them, and bounds without which they have no optimum.
+//! What an evolution law of the state, and the form of friction, demand of a spec: tables that know them, and bounds without which they have no
+//! optimum.
 
-use super::error::{SpecError, refuse};
+use super::error::{SpecError, refuse, unknown};
+use super::spec::ModelSpec;
 use crate::grid::{Block, Quantity};
-use crate::model::StateLaw;
+use crate::model::{Friction, StateLaw};
 use crate::table::Table;
 
-/// Checks that `table`, at `key` of a spec, knows every law of `block`, and that the block has the bounds that these laws need. Keys of the block
-/// begin with `prefix`.
+/// The tables with regularised friction, and the columns that they lack.
+const REGULARISED: [(&str, &[&str]); 3] = [
+    ("gap", &["work_error", "gap_error"]),
+    ("optimal", &["work_error", "v_ceiling_least", "tau_ceiling_least"]),
+    ("stability", &["hopf_type", "first_lyapunov_coefficient", "slip_fraction_smooth", "law_eps_smooth"]),
+];
+
+/// The form of friction of `model`.
+///
+/// # Errors
+///
+/// An unknown word.
+pub fn friction(model: &ModelSpec) -> Result<Friction, SpecError> {
+    let names = Friction::ALL.map(Friction::name);
+    Friction::find(&model.friction)
+        .ok_or_else(|| unknown("model.friction".to_owned(), "form of friction", &model.friction, &names))
+}
+
+/// The fault of a table at `key` that does not support something.
+fn unsupported(key: &str, table: &Table, what: &str, expected: &str) -> Result<(), SpecError> {
+    let found = format!("`{}` does not support {what}", table.name());
+    refuse(key, found, expected, "change this, or move the table to a spec of its own")
+}
+
+/// Checks that `table`, at `key` of a spec, and its requested `columns` exist with regularised friction, for the axes of `block`.
+///
+/// # Errors
+///
+/// A table, a column or a value of an axis that regularised friction does not support.
+pub fn check_regularised(key: &str, table: &Table, columns: Option<&[String]>, block: &Block) -> Result<(), SpecError> {
+    let Some((_, lacking)) = REGULARISED.iter().find(|(known, _)| *known == table.name()) else {
+        let expected = format!("one of {}", REGULARISED.map(|(name, _)| name).join(", "));
+        return unsupported(key, table, "regularised friction", &expected);
+    };
+    if let Some(column) = columns.into_iter().flatten().find(|column| lacking.contains(&column.as_str())) {
+        let what = format!("the column `{column}` with regularised friction");
+        return unsupported(&format!("{key}.columns"), table, &what, "the other columns");
+    }
+    for (quantity, only, expected) in [
+        (Quantity::Law, 0.0, "law = \"ageing\""),
+        (Quantity::VelocityCeiling, f64::INFINITY, "v_ceiling = inf"),
+        (Quantity::FrictionCeiling, f64::INFINITY, "tau_ceiling = inf"),
+    ] {
+        if table.axes().contains(&quantity) && block.may_be(quantity, |value| value != only) {
+            return unsupported(
+                key,
+                table,
+                &format!("another {} with regularised friction", quantity.name()),
+                expected,
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Checks that `table`, at `key` of a spec, knows every law of `block`, and that the block has the bounds that these laws need.
 ///
 /// # Errors
 ///
 /// The first law that the table does not support, or the first bound that is missing or unknown.
-pub fn check(key: &str, table: &Table, block: &Block, prefix: &str, is_bounded: bool) -> Result<(), SpecError> {
-    check_interpolated(key, table, block, prefix)?;
+pub fn check(key: &str, table: &Table, block: &Block, is_bounded: bool) -> Result<(), SpecError> {
+    if block.scale(Quantity::LawEps).is_some() {
+        if !table.axes().contains(&Quantity::LawEps) {
+            return unsupported(key, table, "the interpolated law", "no axis law_eps");
+        }
+        if block.scale(Quantity::Law).is_some() {
+            return unsupported(key, table, "two evolution laws", "one of the axes law and law_eps");
+        }
+    }
     let Some(axis) = block.axis(Quantity::Law) else { return Ok(()) };
     let mut laws = (0..axis.values.len()).filter_map(|step| StateLaw::ALL.get(axis.values.at(step) as usize));
     let Some(law) = laws.find(|law| **law != StateLaw::Ageing) else { return Ok(()) };
-    let (name, law) = (table.name(), law.name());
+    let law = format!("the law \"{}\"", law.name());
     if !table.axes().contains(&Quantity::Law) {
-        let found = format!("`{name}` does not support the law \"{law}\" of {prefix}axes.law");
-        return refuse(key, found, "law = \"ageing\"", "remove the table, or move it to a spec of its own");
+        return unsupported(key, table, &law, "law = \"ageing\"");
     }
     // Without an optimum no law needs bounds.
     if !table.axes().contains(&Quantity::VelocityCeiling) {
         return Ok(());
     }
     if !is_bounded {
-        let found = format!("`{name}` has no optimum without a velocity floor for the law \"{law}\"");
-        return refuse(
-            "model.velocity_bound",
-            found,
-            "true",
-            "remove the key, or compute the law in a spec of its own",
-        );
+        return unsupported(key, table, &format!("{law} without a velocity floor"), "model.velocity_bound = true");
     }
     if has_with_law(block, Quantity::VelocityCeiling, f64::is_infinite) {
-        let found = format!(
-            "`{name}` has no optimum without a velocity ceiling for the law \"{law}\": faster is always better"
-        );
-        let help = format!("add a finite {prefix}axes.v_ceiling, such as `v_ceiling = 1000.0`");
-        return refuse(key, found, "a finite v_ceiling, at least v_i and v_f", help);
+        let what = format!("{law} without a velocity ceiling: faster is always better");
+        return unsupported(key, table, &what, "a finite v_ceiling, such as `v_ceiling = 1000.0`");
     }
     if has_with_law(block, Quantity::FrictionCeiling, f64::is_finite) {
-        let found = format!("`{name}` supports no friction ceiling for the law \"{law}\"");
-        return refuse(key, found, "tau_ceiling = inf", "remove tau_ceiling, or compute the law in a spec of its own");
-    }
-    Ok(())
-}
-
-/// Checks that `table` knows the interpolated law if `block` names it, and that the block names no other law.
-fn check_interpolated(key: &str, table: &Table, block: &Block, prefix: &str) -> Result<(), SpecError> {
-    let is_named = |quantity: Quantity| block.scale(quantity).is_some();
-    if !is_named(Quantity::LawEps) {
-        return Ok(());
-    }
-    if is_named(Quantity::Law) {
-        let found = format!("{prefix}axes.law and {prefix}axes.law_eps both name the evolution law");
-        return refuse(key, found, "one of the two axes", "remove one of them, or compute it in a spec of its own");
-    }
-    if !table.axes().contains(&Quantity::LawEps) {
-        let found = format!("`{}` does not support the interpolated law of {prefix}axes.law_eps", table.name());
-        return refuse(key, found, "no axis law_eps", "remove the table, or move it to a spec of its own");
+        return unsupported(key, table, &format!("a friction ceiling for {law}"), "tau_ceiling = inf");
     }
     Ok(())
 }

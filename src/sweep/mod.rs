@@ -8,7 +8,6 @@ mod direct;
 mod engine;
 mod error;
 mod estimate;
-mod friction;
 mod identity;
 mod laws;
 mod plan;
@@ -26,11 +25,13 @@ pub(crate) use check::check_name;
 #[cfg(any(feature = "cli", feature = "query"))]
 pub(crate) use check::path_hint;
 pub use check::{Request, Sweep};
+#[cfg(feature = "query")]
+pub(crate) use direct::available_bytes;
 pub use direct::{Direct, Given, RowsError};
 pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
-pub use estimate::{Estimate, Estimates, estimate, sizes};
-pub use friction::friction;
+pub use estimate::{Estimate, Estimates, estimate};
+pub use laws::friction;
 pub use plan::Plan;
 pub use schema::schema;
 #[cfg(feature = "cli")]

@@ -17,7 +17,6 @@ pub fn schema() -> Value {
     // The values of the scales do not matter here.
     let si = Units::Si(Scales { mu_0: 1.0, l: 1.0, v_0: 1.0, normal_stress: 1.0 });
     let grid = grid();
-    let grid_keys: Vec<Value> = grid.keys().map(|key| json!({ "required": [key] })).collect();
     let mut properties = own();
     properties["block"] = json!({
         "type": "array",
@@ -33,9 +32,7 @@ pub fn schema() -> Value {
         "additionalProperties": false,
         "required": ["name", "tables"],
         "properties": properties,
-        "allOf": table::ALL.map(needs).into_iter().chain([units()]).collect::<Vec<Value>>(),
-        // With blocks, the grid is in the blocks.
-        "dependencies": { "block": { "not": { "anyOf": grid_keys } } },
+        "allOf": [units()],
         "definitions": { "axes": axes("The axes", &Units::Scaled), "axes_si": axes("The axes in SI units", &si) },
     })
 }
@@ -73,12 +70,7 @@ fn own() -> Value {
             "description": "Form of the direct effect: a logarithm, or an inverse hyperbolic sine, which holds down to rest",
         },
         "units": {
-            "anyOf": [
-                { "enum": ["dimensionless", "si"] },
-                { "pattern": any_case("dimensionless") },
-                { "pattern": any_case("si") },
-            ],
-            "type": "string",
+            "enum": UNIT_SYSTEMS,
             "default": "dimensionless",
             "description": "Units of the values",
         },
@@ -113,45 +105,21 @@ fn axes(what: &str, units: &Units) -> Value {
     keys(&description, Value::Object(axes.into_iter().collect()))
 }
 
+/// The words for systems of units; the check ignores the case of letters.
+const UNIT_SYSTEMS: [&str; 3] = ["dimensionless", "si", "SI"];
+
 /// The condition of the units: SI units need the four scales.
 fn units() -> Value {
-    let scales = ["mu_0", "l", "v_0", "normal_stress"];
-    let is_si =
-        json!({ "required": ["units"], "properties": { "units": { "type": "string", "pattern": any_case("si") } } });
+    let is_si = json!({ "required": ["units"], "properties": { "units": { "enum": UNIT_SYSTEMS[1..] } } });
     let both = |axes: &str, model: Value| {
         let axes = json!({ "$ref": axes });
         let block = json!({ "items": { "properties": { "axes": axes } } });
         json!({ "properties": { "model": model, "axes": axes, "block": block } })
     };
-    let no_scales = json!({ "not": { "anyOf": scales.map(|scale| json!({ "required": [scale] })) } });
     json!({
         "if": { "required": ["model"], "properties": { "model": is_si } },
-        "then": both("#/definitions/axes_si", json!({ "required": scales })),
-        "else": both("#/definitions/axes", no_scales),
-    })
-}
-
-/// A pattern of `word` in letters of any case.
-fn any_case(word: &str) -> String {
-    let letters = word.chars().map(|letter| format!("[{letter}{}]", letter.to_ascii_uppercase()));
-    format!("^{}$", letters.collect::<String>())
-}
-
-/// The condition that a table has its axes, unless points or blocks may define them.
-fn needs(table: &Table) -> Value {
-    let axes = table.axes().iter().filter(|axis| axis.default().is_empty());
-    let axes: Vec<&str> = axes.map(|axis| axis.name()).collect();
-    let there = json!([
-        { "required": ["axes"], "properties": { "axes": { "required": axes } } },
-        { "required": ["points"] },
-    ]);
-    json!({
-        "if": { "required": ["tables"], "properties": { "tables": { "required": [table.name()] } } },
-        "then": {
-            "if": { "required": ["block"] },
-            "then": { "properties": { "block": { "items": { "anyOf": there } } } },
-            "else": { "anyOf": there },
-        },
+        "then": both("#/definitions/axes_si", json!({ "required": ["mu_0", "l", "v_0", "normal_stress"] })),
+        "else": both("#/definitions/axes", json!({})),
     })
 }
 
@@ -174,19 +142,12 @@ fn axis(quantity: Quantity, units: &Units) -> Value {
     json!({ "description": description, "anyOf": [one, list(&one), form(quantity, units)] })
 }
 
-/// The schema of a number of `quantity`. In SI units the range keeps its sign only, since the schema does not know the scales.
+/// The schema of a number of `quantity`; without its range in SI units, since the schema does not know the scales.
 fn legal(quantity: Quantity, units: &Units) -> Map<String, Value> {
-    let domain = quantity.domain();
-    let mut value = number(&domain);
-    if *units != Units::Scaled {
-        value.retain(|key, _| key == "type");
-        if domain.contains(0.0) && domain.least >= 0.0 || domain.apart == Some(0.0) {
-            value.insert("minimum".to_owned(), json!(0.0));
-        } else if domain.least > 0.0 {
-            value.insert("exclusiveMinimum".to_owned(), json!(0.0));
-        }
+    match units {
+        Units::Scaled => number(&quantity.domain()),
+        Units::Si(_) => [("type".to_owned(), json!("number"))].into_iter().collect(),
     }
-    value
 }
 
 /// The schema of a number in this range; from 0 on if 0 is an isolated value, which would need two ranges.
@@ -200,26 +161,22 @@ fn number(domain: &Domain) -> Map<String, Value> {
 /// A range, with its unit.
 fn form(quantity: Quantity, units: &Units) -> Value {
     let end = legal(quantity, units);
-    let triple = |end: &Map<String, Value>, least: u64, most: u64| {
+    let triple = |least: u64, most: u64, description: &str| {
         let count = json!({ "type": "integer", "minimum": least, "maximum": most });
-        json!({ "type": "array", "items": [end, end, count], "minItems": 3, "maxItems": 3 })
+        json!({
+            "type": "array",
+            "items": [end, end, count],
+            "minItems": 3,
+            "maxItems": 3,
+            "description": description,
+        })
     };
-    let range = |end: &Map<String, Value>| triple(end, 2, (1 << 53) - 1);
+    let range =
+        |how: &str| triple(2, (1 << 53) - 1, &format!("[first, last, count], evenly spaced{how}, both ends included"));
     let sample = |design: Design, kind: &str| {
-        let description = format!("[least, greatest, count], a {kind}, joint over all such axes");
-        json!({ "allOf": [triple(&end, 1, design.most())], "description": description })
+        triple(1, design.most(), &format!("[least, greatest, count], a {kind}, joint over all such axes"))
     };
-    // Both ends of a geometric range are on one side of zero.
-    let mut above = end.clone();
-    if above.get("minimum").and_then(Value::as_f64).is_none_or(|least| least <= 0.0) {
-        above.remove("minimum");
-        above.entry("exclusiveMinimum").or_insert(json!(0.0));
-    }
-    let mut below = end.clone();
-    below.insert("exclusiveMaximum".to_owned(), json!(0.0));
-    let sides = if quantity.domain().least < 0.0 { vec![range(&above), range(&below)] } else { vec![range(&above)] };
     let names: Vec<&str> = quantity.scales().iter().map(|scale| unit_name(units, quantity, *scale)).collect();
-    let spaced = |how: &str| format!("[first, last, count], evenly spaced{how}, both ends included");
     let expression = "Computed from other axes at every point, such as 10 * v_i";
     let forms = ["linspace", "geomspace", "expr", "sobol", "lhs"];
     let seed = "Seed of sobol or lhs, one for all axes of a sample";
@@ -227,8 +184,8 @@ fn form(quantity: Quantity, units: &Units) -> Value {
         "type": "object",
         "additionalProperties": false,
         "properties": {
-            "linspace": { "allOf": [range(&end)], "description": spaced("") },
-            "geomspace": { "anyOf": sides, "description": spaced(" in the logarithm") },
+            "linspace": range(""),
+            "geomspace": range(" in the logarithm"),
             "expr": { "type": "string", "minLength": 1, "description": expression },
             "sobol": sample(Design::Sobol, "Sobol sequence"),
             "lhs": sample(Design::LatinHypercube, "Latin hypercube"),
@@ -236,7 +193,6 @@ fn form(quantity: Quantity, units: &Units) -> Value {
             "unit": { "enum": names, "description": "Unit of the values" },
         },
         "oneOf": forms.map(|form| json!({ "required": [form] })),
-        "dependencies": { "seed": { "anyOf": [{ "required": ["sobol"] }, { "required": ["lhs"] }] } },
     })
 }
 

@@ -1,16 +1,18 @@
 //! The spec: keys and types, without checks of values.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use indexmap::IndexMap;
-use toml::de::DeValue;
+use serde::Deserialize;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::error::Faults;
-use super::read::{Entry, Read, keys};
 use crate::model::Friction;
 
 /// A sweep spec.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(from = "Written")]
 pub struct Spec {
     /// Name of the dataset and of its folder.
     pub name: String,
@@ -28,14 +30,47 @@ pub struct Spec {
     pub tables: IndexMap<String, TableSpec>,
 }
 
+/// The keys of a spec, with those of its block at the top level.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    name: String,
+    #[serde(default)]
+    description: String,
+    points: Option<PathBuf>,
+    #[serde(default)]
+    zip: Vec<Vec<String>>,
+    r#where: Option<String>,
+    #[serde(default)]
+    block: Vec<BlockSpec>,
+    #[serde(default)]
+    model: ModelSpec,
+    #[serde(default)]
+    accuracy: AccuracySpec,
+    #[serde(default)]
+    axes: IndexMap<String, AxisSpec>,
+    #[serde(default)]
+    tables: IndexMap<String, TableSpec>,
+}
+
+impl From<Written> for Spec {
+    fn from(written: Written) -> Spec {
+        let Written { name, description, points, zip, r#where: condition, block, model, accuracy, axes, tables } =
+            written;
+        Spec { name, description, top: BlockSpec { points, zip, condition, axes }, block, model, accuracy, tables }
+    }
+}
+
 /// A key of `[[block]]`, or of the top level of a spec without blocks.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct BlockSpec {
     /// A file of points whose columns are axes that vary together, and labels; relative to the spec.
     pub points: Option<PathBuf>,
     /// Axes that advance together.
     pub zip: Vec<Vec<String>>,
     /// Condition of the points to keep.
+    #[serde(rename = "where")]
     pub condition: Option<String>,
     /// The axes, the last varies fastest.
     pub axes: IndexMap<String, AxisSpec>,
@@ -56,7 +91,8 @@ impl Spec {
 }
 
 /// `[model]`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct ModelSpec {
     /// Whether optimal protocols obey `v >= 1`.
     pub velocity_bound: bool,
@@ -89,7 +125,8 @@ impl Default for ModelSpec {
 }
 
 /// `[accuracy]`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct AccuracySpec {
     /// Relative accuracy of the numbers.
     pub rtol: f64,
@@ -113,7 +150,8 @@ pub enum AxisSpec {
 }
 
 /// A value of an axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged, expecting = "a number or a word")]
 pub enum AxisValue {
     /// A number.
     Number(f64),
@@ -122,7 +160,8 @@ pub enum AxisValue {
 }
 
 /// An axis written as a table.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct AxisForm {
     /// `[first, last, count]`, evenly spaced.
     pub linspace: Option<Vec<f64>>,
@@ -141,7 +180,8 @@ pub struct AxisForm {
 }
 
 /// The value of a key of `[tables]`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct TableSpec {
     /// The columns to compute and write; all by default.
     pub columns: Option<Vec<String>>,
@@ -151,33 +191,41 @@ pub struct TableSpec {
     pub reduce: Option<String>,
 }
 
-keys! {
-    Spec {
-        "name": name, "description": description, "points": top.points, "zip": top.zip, "where": top.condition,
-        "block": block, "model": model, "accuracy": accuracy, "axes": top.axes, "tables": tables
-    }
-    BlockSpec { "points": points, "zip": zip, "where": condition, "axes": axes }
-    ModelSpec {
-        "velocity_bound": velocity_bound, "friction": friction, "units": units, "mu_0": mu_0, "l": l, "v_0": v_0,
-        "normal_stress": normal_stress
-    }
-    AccuracySpec { "rtol": rtol }
-    AxisForm {
-        "linspace": linspace, "geomspace": geomspace, "unit": unit, "expr": expr, "sobol": sobol, "lhs": lhs, "seed": seed
-    }
-    TableSpec { "columns": columns, "rtol": rtol, "reduce": reduce }
-}
-
 /// The legal forms of an axis of numbers.
 pub const AXIS: &str = "a number, a list of numbers or a range such as { linspace = [first, last, count] }";
 
-impl Read for AxisSpec {
-    fn read(entry: Entry<'_>, faults: &mut Faults) -> Option<AxisSpec> {
-        match entry.value {
-            DeValue::Array(_) => Read::read(entry, faults).map(AxisSpec::List),
-            DeValue::Table(_) => Read::read(entry, faults).map(AxisSpec::Form),
-            DeValue::Datetime(_) => entry.wrong("a number, a word, a list or a table", faults),
-            _ => entry.one().map(AxisSpec::One).or_else(|| entry.wrong(AXIS, faults)),
+impl<'de> Deserialize<'de> for AxisSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<AxisSpec, D::Error> {
+        struct Forms;
+
+        impl<'de> Visitor<'de> for Forms {
+            type Value = AxisSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(AXIS)
+            }
+
+            fn visit_i64<E>(self, number: i64) -> Result<AxisSpec, E> {
+                Ok(AxisSpec::One(AxisValue::Number(number as f64)))
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<AxisSpec, E> {
+                Ok(AxisSpec::One(AxisValue::Number(number)))
+            }
+
+            fn visit_str<E>(self, word: &str) -> Result<AxisSpec, E> {
+                Ok(AxisSpec::One(AxisValue::Word(word.to_owned())))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, values: A) -> Result<AxisSpec, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(values)).map(AxisSpec::List)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<AxisSpec, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(keys)).map(AxisSpec::Form)
+            }
         }
+
+        deserializer.deserialize_any(Forms)
     }
 }

@@ -87,7 +87,7 @@ fn compute_by(
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
     let work = on_all_threads(chunks(&groups, buffer, job.projection), |chunk| {
         job.signal.check()?;
-        let length = chunk.cells.status.len() as u64;
+        let length = chunk.status.len() as u64;
         let work = evaluate((job, prepare), &groups, &coefficients, chunk);
         job.signal.advance(length);
         Ok(work)
@@ -243,54 +243,27 @@ impl<'a> Coefficients<'a> {
     }
 }
 
-/// The cells of consecutive places; a column that is not requested is empty.
-struct CellSlices<'a> {
+/// The work unit of a thread: places of one or several groups, and their cells; a column that is not requested is empty.
+struct RowChunk<'a> {
+    first_group: usize,
+    place: usize,
     columns: [&'a mut [f64]; COLUMNS.len()],
     status: &'a mut [Status],
 }
 
-impl<'a> CellSlices<'a> {
-    fn split(self, at: usize) -> (CellSlices<'a>, CellSlices<'a>) {
-        let (first, second) = self.status.split_at_mut(at);
-        let mut left = CellSlices { columns: std::array::from_fn(|_| Default::default()), status: first };
-        let mut right = CellSlices { columns: std::array::from_fn(|_| Default::default()), status: second };
-        for (i, column) in self.columns.into_iter().enumerate() {
-            let middle = at.min(column.len());
-            (left.columns[i], right.columns[i]) = column.split_at_mut(middle);
-        }
-        (left, right)
-    }
-}
-
-/// The work unit of a thread: places of one or several groups.
-struct RowChunk<'a> {
-    first_group: usize,
-    place: usize,
-    cells: CellSlices<'a>,
-}
-
 /// Cuts a part into chunks.
 fn chunks<'a>(groups: &[LandscapeRows], buffer: &'a mut ColumnBuffer, projection: &Projection) -> Vec<RowChunk<'a>> {
-    let mut rest = CellSlices { columns: std::array::from_fn(|_| Default::default()), status: &mut buffer.status };
+    let mut columns = [(); COLUMNS.len()].map(|()| <&mut [f64]>::default().chunks_mut(CHUNK));
     for (column, &index) in buffer.columns.iter_mut().zip(projection.indices()) {
-        rest.columns[index] = column;
+        columns[index] = column.chunks_mut(CHUNK);
     }
-    let mut chunks = Vec::new();
-    let (mut group, mut place) = (0, 0);
-    while !rest.status.is_empty() {
-        let (cells, others) = {
-            let length = rest.status.len();
-            rest.split(CHUNK.min(length))
-        };
-        rest = others;
-        while groups[group].places.end <= place {
-            group += 1;
-        }
-        let length = cells.status.len();
-        chunks.push(RowChunk { first_group: group, place, cells });
-        place += length;
-    }
-    chunks
+    let chunk = |(number, status): (usize, &'a mut [Status])| {
+        let place = number * CHUNK;
+        let first_group = groups.partition_point(|group| group.places.end <= place);
+        let columns = columns.each_mut().map(|column| column.next().unwrap_or_default());
+        RowChunk { first_group, place, columns, status }
+    };
+    buffer.status.chunks_mut(CHUNK).enumerate().map(chunk).collect()
 }
 
 /// Computes a chunk, group by group.
@@ -300,66 +273,64 @@ fn evaluate(
     coefficients: &Coefficients<'_>,
     chunk: RowChunk<'_>,
 ) -> RunStats {
-    let RowChunk { first_group, mut place, mut cells } = chunk;
-    cells.columns.iter_mut().for_each(|column| column.fill(f64::NAN));
+    let RowChunk { first_group, place: start, mut columns, status } = chunk;
+    columns.iter_mut().for_each(|column| column.fill(f64::NAN));
     let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
     let is_rounded = coefficients.natural.contains(&true);
     let (mut work_buffer, mut v_min_buffer, mut error_buffer) = (Vec::new(), Vec::new(), Vec::new());
     let mut work = RunStats::default();
-    for group in &groups[first_group..] {
-        if cells.status.is_empty() {
-            break;
-        }
-        let length = (group.places.end - place).min(cells.status.len());
-        failpoint::panic_at((place..place + length).map(|place| coefficients.row(place)));
-        let (now, later) = cells.split(length);
-        cells = later;
+    let end = start + status.len();
+    for group in groups[first_group..].iter().take_while(|group| group.places.start < end) {
+        let places = group.places.start.max(start)..group.places.end.min(end);
+        failpoint::panic_at(places.clone().map(|place| coefficients.row(place)));
+        let (length, cells) = (places.len(), places.start - start..places.end - start);
+        let status = &mut status[cells.clone()];
         let point = job.grid.scaled(&coefficients.view.point(group.row));
         let prepared = group.prepared.get_or_init(|| prepare(job, group, &point, &mut work));
-        let (t_f, first) = (point[Quantity::Time], place);
-        coefficients.fill(place..place + length, t_f, [&mut a_2, &mut a_3]);
-        place += length;
+        let t_f = point[Quantity::Time];
+        coefficients.fill(places.clone(), t_f, [&mut a_2, &mut a_3]);
 
         let Some(landscape) = &prepared.landscape else {
-            now.status.fill(Status::Infeasible);
+            status.fill(Status::Infeasible);
             continue;
         };
 
-        let [work_s, work_optimal, gap, v_min, work_error, gap_error, v_max] = now.columns;
+        let [work_s, work_optimal, gap, v_min, work_error, gap_error, v_max] =
+            columns.each_mut().map(|column| column.get_mut(cells.clone()).unwrap_or_default());
         let with_work = !gap.is_empty() || prepared.finest.is_some();
         let works = if work_s.is_empty() && with_work { buffer(&mut work_buffer, length) } else { work_s };
         let v_min = if v_min.is_empty() { buffer(&mut v_min_buffer, length) } else { v_min };
-        let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
+        let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *status };
         work += RunStats::from(landscape.evaluate(&a_2, &a_3, out));
         if job.friction == Friction::Regularised {
-            let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *now.status };
+            let out = LandscapeBuffers { work: &mut *works, v_min: &mut *v_min, status: &mut *status };
             work += RunStats::from(landscape.regularise(&a_2, &a_3, job.rtol, out));
         }
         let errors = if work_error.is_empty() { buffer(&mut error_buffer, length) } else { work_error };
         if let Some((finest, transition, t_f)) = &prepared.finest {
-            let mut again = now.status.to_vec();
+            let mut again = status.to_vec();
             let out = LandscapeBuffers { work: &mut *errors, v_min: &mut [], status: &mut again };
             work += RunStats::from(finest.evaluate(&a_2, &a_3, out));
             for ((error, &work_s), &v_min) in errors.iter_mut().zip(&*works).zip(&*v_min) {
                 *error = error::of_shortcut(transition, *t_f, v_min, work_s, *error);
             }
         }
-        landscape.greatest_velocities(&a_2, &a_3, now.status, v_max);
+        landscape.greatest_velocities(&a_2, &a_3, status, v_max);
         for i in (0..length).filter(|_| is_rounded) {
             let rounded = [a_2[i], a_3[i]];
-            if !prepared.depends_on_rounding(landscape, rounded, now.status[i], v_min[i]) {
+            if !prepared.depends_on_rounding(landscape, rounded, status[i], v_min[i]) {
                 continue;
             }
-            let place = coefficients.exact(first + i, t_f);
+            let place = coefficients.exact(places.start + i, t_f);
             let (exact, error) = prepared.exact(landscape, job, place, &mut work);
-            now.status[i] = exact.status;
+            status[i] = exact.status;
             let cells = [works.get_mut(i), v_min.get_mut(i), v_max.get_mut(i), errors.get_mut(i)];
             for (cell, value) in cells.into_iter().zip([exact.work, exact.v_min, exact.v_max, error]) {
                 cell.into_iter().for_each(|cell| *cell = value);
             }
         }
 
-        compare(prepared, now.status, [works, v_min, work_optimal, gap, gap_error], errors);
+        compare(prepared, status, [works, v_min, work_optimal, gap, gap_error], errors);
     }
     work
 }

@@ -27,7 +27,7 @@ use crate::protocol::Status;
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
 pub use optimum_cache::{OPTIMUM_AXES, OptimumCache, uncapped_optimum};
-#[cfg(feature = "plot")]
+#[cfg(feature = "read")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MAX_SORTED;
 

@@ -25,21 +25,27 @@ pub struct Rest {
     pub terminal_error: f64,
 }
 
-/// The part of a motion up to a place `s`.
-pub(super) struct MotionStart {
+/// The part of a motion up to a place `s`, which does not arrive in steady sliding if it is shorter, or depart from it if it starts from a state.
+pub(super) struct MotionPart {
     motion: Box<dyn Motion>,
     s: f64,
     t: f64,
+    departs: bool,
 }
 
-impl MotionStart {
+impl MotionPart {
     /// The part of `motion` up to a place, and its moment there.
-    pub(super) fn new(motion: Box<dyn Motion>, (s, moment): (f64, Moment)) -> MotionStart {
-        MotionStart { motion, s, t: moment.t }
+    pub(super) fn start(motion: Box<dyn Motion>, (s, moment): (f64, Moment)) -> MotionPart {
+        MotionPart { motion, s, t: moment.t, departs: true }
+    }
+
+    /// A motion that starts from a state on the way, not from steady sliding.
+    pub(super) fn from_state(motion: Box<dyn Motion>) -> MotionPart {
+        MotionPart { s: 1.0, t: motion.duration(), motion, departs: false }
     }
 }
 
-impl Motion for MotionStart {
+impl Motion for MotionPart {
     fn duration(&self) -> f64 {
         self.t
     }
@@ -53,8 +59,12 @@ impl Motion for MotionStart {
         self.motion.at(s * self.s)
     }
 
+    fn departs(&self) -> bool {
+        self.departs
+    }
+
     fn arrives(&self) -> bool {
-        false
+        self.s == 1.0
     }
 }
 

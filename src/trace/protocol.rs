@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::disturbed::{self, Disturbance, Rest};
+use super::disturbed::{self, Disturbance, MotionPart, Rest};
 use super::sample;
 use crate::grid::Quantity;
 use crate::model::{Friction, Law, StateLaw, Transition, Units};
@@ -11,9 +11,7 @@ use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::cubic::Landscape;
 use crate::protocol::optimal::{self, Bounds, Optimum};
 use crate::protocol::shortcut::{self, Case, FAMILIES, Family, Obstacle};
-use crate::protocol::{
-    Moment, Motion, SolverStats, SpringBlock, Status, arcsinh, best_cubic, compliant, regularised, relaxed,
-};
+use crate::protocol::{Motion, SolverStats, SpringBlock, Status, arcsinh, best_cubic, compliant, regularised, relaxed};
 use crate::stability::step_response::VelocityStep;
 
 /// A protocol, with its spring if that is elastic.
@@ -337,6 +335,15 @@ impl Protocol {
     }
 }
 
+/// The reason for a missing protocol, by its status.
+fn reason(status: Status, infeasible: impl FnOnce() -> Absence) -> Absence {
+    match status {
+        Status::Infeasible => infeasible(),
+        Status::Unproven => Absence::Unproven,
+        _ => Obstacle::NotConverged.into(),
+    }
+}
+
 fn optimum(case: &Case, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absence> {
     let (solved, motion) = optimal::motion(&case.transition, case.t_f, bounds, rtol);
     let (Some(value), Some(motion)) = (solved.value, motion) else {
@@ -350,12 +357,9 @@ fn regularised_optimum(case: &Case) -> Result<TracedPath, Absence> {
     let Case { transition, t_f, .. } = *case;
     let (solved, motion) = arcsinh::motion(&transition, t_f);
     let (Some(found), Some(motion)) = (solved.value, motion) else {
-        return Err(match (solved.status, arcsinh::least_time(&transition)) {
-            (Status::Infeasible, Some(t_min)) => Absence::Time { t_f, t_min, bounded: false },
-            (Status::Infeasible, None) => Obstacle::Domain.into(),
-            (Status::Unproven, _) => Absence::Unproven,
-            _ => Obstacle::NotConverged.into(),
-        });
+        let too_short = |t_min| Absence::Time { t_f, t_min, bounded: false };
+        let infeasible = || arcsinh::least_time(&transition).map_or(Obstacle::Domain.into(), too_short);
+        return Err(reason(solved.status, infeasible));
     };
     let hamiltonian = Parameter::new("hamiltonian", found.optimum.hamiltonian, "mu_0 sigma v_0", "dW*/dt_f");
     Ok(TracedPath { motion, status: solved.status, work: found.optimum.work, parameters: vec![hamiltonian] })
@@ -366,19 +370,12 @@ fn relaxed_optimum(case: &Case, law: StateLaw, v_ceiling: f64) -> Result<TracedP
     let Case { transition, t_f, .. } = *case;
     let (solved, motion) = relaxed::motion(law, &transition, t_f, v_ceiling);
     let (Some(found), Some(motion)) = (solved.value, motion) else {
+        let ceiling = |above: f64| Absence::Ceiling { obstacle: optimal::Obstacle::VCeiling { above }, t_f };
+        let too_fast = |t_least| Absence::Ceiling { obstacle: optimal::Obstacle::TooFast { t_least }, t_f };
         let least = relaxed::least_time(law, &transition, v_ceiling);
-        return Err(match (solved.status, least) {
-            (Status::Infeasible, Some(t_least)) => {
-                Absence::Ceiling { obstacle: optimal::Obstacle::TooFast { t_least }, t_f }
-            }
-            (Status::Infeasible, None) => {
-                Absence::Ceiling { obstacle: optimal::Obstacle::VCeiling { above: transition.v_f }, t_f }
-            }
-            (Status::Unproven, _) if transition.v_i > v_ceiling => {
-                Absence::Ceiling { obstacle: optimal::Obstacle::VCeiling { above: transition.v_i }, t_f }
-            }
-            (Status::Unproven, _) => Absence::Unproven,
-            _ => Obstacle::NotConverged.into(),
+        return Err(match solved.status {
+            Status::Unproven if transition.v_i > v_ceiling => ceiling(transition.v_i),
+            status => reason(status, || least.map_or(ceiling(transition.v_f), too_fast)),
         });
     };
     let bounds = Bounds::new(true).with_v_ceiling(v_ceiling);
@@ -411,39 +408,14 @@ fn of_optimum(value: &Optimum, bounds: &Bounds) -> Vec<Parameter> {
     parameters
 }
 
-/// A motion that starts from a state on the way, not from steady sliding.
-struct FromState(Box<dyn Motion>);
-
-impl Motion for FromState {
-    fn duration(&self) -> f64 {
-        self.0.duration()
-    }
-
-    fn landmarks(&self) -> Vec<f64> {
-        self.0.landmarks()
-    }
-
-    fn at(&self, s: f64) -> Moment {
-        self.0.at(s)
-    }
-
-    fn departs(&self) -> bool {
-        false
-    }
-}
-
 /// The rest of an optimal protocol from the state `theta`, in the time `case.t_f`.
 fn rest(case: &Case, theta: f64, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absence> {
     let Transition { law, v_f, .. } = case.transition;
     let (solved, motion) = optimal::motion_from(law, theta, case.t_f, v_f, bounds, rtol);
     let (Some(value), Some(motion)) = (solved.value, motion) else {
-        return Err(match solved.status {
-            Status::Infeasible => Absence::State,
-            Status::Unproven => Absence::Unproven,
-            _ => Obstacle::NotConverged.into(),
-        });
+        return Err(reason(solved.status, || Absence::State));
     };
-    let (motion, parameters) = (Box::new(FromState(motion)), of_optimum(&value, bounds));
+    let (motion, parameters) = (Box::new(MotionPart::from_state(motion)), of_optimum(&value, bounds));
     Ok(TracedPath { motion, status: solved.status, work: value.work, parameters })
 }
 
@@ -479,7 +451,7 @@ impl Disturbed {
         let closed = go(moment.theta * (1.0 + disturbance.change))?;
         let work = planned.work - undisturbed + closed.work;
         let open = disturbed::open_loop(motion()?, place, planned.work, disturbance.change, &case.transition);
-        let head = Box::new(disturbed::MotionStart::new(motion()?, place));
+        let head = Box::new(MotionPart::start(motion()?, place));
         let closed = Rest { motion: closed.motion, work, terminal_error: 0.0 };
         Ok(Disturbed { head, t: moment.t, planned, open, closed })
     }
@@ -489,19 +461,15 @@ impl Disturbed {
 const DISTURBED_RTOL: f64 = 1e-12;
 
 fn without_optimum(case: &Case, bounds: &Bounds, status: Status) -> Absence {
-    let bounded = bounds.floor;
-    if status == Status::Infeasible
-        && bounds.has_ceilings()
-        && let Some(obstacle) = optimal::obstacle(&case.transition, case.t_f, bounds)
-    {
-        return Absence::Ceiling { obstacle, t_f: case.t_f };
-    }
-    match (status, optimal::shortest_time(&case.transition, bounded)) {
-        (Status::Unproven, _) => Absence::Unproven,
-        (Status::Infeasible, Some(t_min)) if case.t_f <= t_min => Absence::Time { t_f: case.t_f, t_min, bounded },
-        (Status::Infeasible, _) => Obstacle::Domain.into(),
-        _ => Obstacle::NotConverged.into(),
-    }
+    let (Case { transition, t_f, .. }, bounded) = (*case, bounds.floor);
+    reason(status, || {
+        let obstacle = optimal::obstacle(&transition, t_f, bounds).filter(|_| bounds.has_ceilings());
+        match (obstacle, optimal::shortest_time(&transition, bounded)) {
+            (Some(obstacle), _) => Absence::Ceiling { obstacle, t_f },
+            (None, Some(t_min)) if t_f <= t_min => Absence::Time { t_f, t_min, bounded },
+            _ => Obstacle::Domain.into(),
+        }
+    })
 }
 
 fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result<TracedPath, Absence> {
@@ -512,11 +480,7 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
             StateLaw::Ageing => optimum(case, bounds, rtol)?,
             _ => relaxed_optimum(case, law, bounds.v_ceiling)?,
         };
-        return Err(match solved.status {
-            Status::Infeasible => Absence::Cubic { bounded: bounds.floor },
-            Status::Unproven => Absence::Unproven,
-            _ => Obstacle::NotConverged.into(),
-        });
+        return Err(reason(solved.status, || Absence::Cubic { bounded: bounds.floor }));
     };
     if value.v_min == 0.0 {
         return Err(Absence::Border);
@@ -581,11 +545,8 @@ fn smooth(case: &Case, k: f64, m: f64, rtol: f64) -> Result<TracedPath, Absence>
     let solved = compliant::solve(&slider, (v_i, v_f), t_f, rtol);
     let t_min = case.transition.min_duration();
     let (Some(value), Ok(path)) = (solved.value, compliant::path(&slider, (v_i, v_f), t_f, rtol)) else {
-        return Err(match solved.status {
-            Status::Infeasible if t_f <= t_min => Absence::Time { t_f, t_min, bounded: true },
-            Status::Infeasible => Obstacle::Domain.into(),
-            _ => Obstacle::NotConverged.into(),
-        });
+        let too_short = Absence::Time { t_f, t_min, bounded: true };
+        return Err(reason(solved.status, || if t_f <= t_min { too_short } else { Obstacle::Domain.into() }));
     };
     let alpha = Parameter::new("alpha", value.alpha, "1", "coefficient of x^3 (1 - x)^3 in ln(v - 1), x = t/t_f");
     let parameters = with_control(alpha, value.control_min, value.control_max);
@@ -597,10 +558,9 @@ fn pieced(case: &Case, (k, m): (f64, f64), delta_t: f64, bounded: bool, rtol: f6
     let (solved, motion) = regularised::motion(&SpringBlock { law, k, m }, (v_i, v_f), t_f, delta_t, bounded, rtol);
     let (Some(value), Some(motion)) = (solved.value, motion) else {
         let optimum = optimal::solve(&case.transition, t_f, bounded, rtol);
-        return Err(match solved.status {
-            _ if optimum.value.is_none() => without_optimum(case, &Bounds::new(bounded), optimum.status),
-            Status::Infeasible => Absence::Pieces,
-            _ => Obstacle::NotConverged.into(),
+        return Err(match optimum.value {
+            None => without_optimum(case, &Bounds::new(bounded), optimum.status),
+            Some(_) => reason(solved.status, || Absence::Pieces),
         });
     };
     let gap = Parameter::new("gap", value.gap, "1", "(work - W*)/W*");

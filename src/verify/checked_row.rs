@@ -2,8 +2,11 @@
 
 use crate::dataset::{Cell, Row};
 use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::protocol::SpringBlock;
 use crate::protocol::optimal::Bounds;
+use crate::protocol::shortcut::Case;
 use crate::table::STATUS;
+use crate::trace::{Pathless, Protocol, protocol_of};
 
 /// The context of a check: properties of the sweep.
 #[derive(Debug, Clone, Copy)]
@@ -94,6 +97,22 @@ impl<'a> CheckedRow<'a> {
 
     pub fn transition(&self) -> Result<Transition, &'static str> {
         Ok(Transition { law: self.law()?, v_i: self.axis("v_i")?, v_f: self.axis("v_f")? })
+    }
+
+    /// The block and its spring, rigid without such a column.
+    pub fn slider(&self) -> Result<SpringBlock, &'static str> {
+        let [k, m] = [("k", f64::INFINITY), ("m", 0.0)].map(|(name, absent)| self.number(name).unwrap_or(absent));
+        Ok(SpringBlock { law: self.law()?, k, m })
+    }
+
+    /// The protocol of a row of `table`.
+    pub fn protocol(&self, table: &str) -> Result<(Protocol, Case), &'static str> {
+        let Context { friction, bounded, relative, .. } = self.context;
+        match protocol_of(table, self.cells, (friction, bounded, relative), None) {
+            Ok((_, protocol, case)) => Ok((protocol, case)),
+            Err(Pathless::Status(reason)) => Err(reason),
+            Err(_) => Err("an axis is missing"),
+        }
     }
 
     /// The bounds of its optimum.

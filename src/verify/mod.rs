@@ -1,18 +1,13 @@
 //! Audit of a dataset: a sample of its rows is checked by the equations that their protocols obey, or solved by a second route.
 
-mod arcsinh;
-mod best_cubic;
 mod checked_row;
-mod compliant;
 mod crossover;
 mod feedback;
-mod gap;
 mod hopf;
 mod motion;
 mod open_loop;
 mod optimal;
 mod reduced;
-mod regularised;
 mod relaxed;
 mod route;
 mod sample;
@@ -27,10 +22,9 @@ use std::path::Path;
 use indexmap::IndexMap;
 
 use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
-use crate::grid::{Quantity, Scale};
 use crate::model::{Friction, Units};
-use crate::sweep::{self, AxisSpec, Spec};
-use crate::table;
+use crate::sweep::{self, Spec};
+use crate::table::{self, Table};
 use checked_row::{Checked, CheckedRow, Context, Difference};
 use sample::Sample;
 pub(crate) use units::scale;
@@ -85,30 +79,31 @@ pub struct VerifyError(String);
 ///
 /// A manifest without a valid spec, or no row of the sample that is computed yet.
 pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Result<Vec<Audit>, VerifyError> {
+    let refused = |error: &dyn std::error::Error| VerifyError(error.to_string());
     let spec = Spec::parse(&manifest.spec)
         .map_err(|error| VerifyError(format!("the spec in the manifest cannot be read: {error}")))?;
-    let units = sweep::units(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
+    let units = sweep::units(&spec.model).map_err(|error| refused(&error))?;
+    let friction = sweep::friction(&spec.model).map_err(|error| refused(&error))?;
+    let bounded = spec.model.velocity_bound && friction == Friction::Log;
     let folder = Folder::at(path);
     let mut audits = Vec::new();
     for table in &manifest.tables {
-        let is_reduced = reduced::is_reduced(&table.name);
-        let key = if is_reduced { "gap" } else { &table.name };
+        let definition = table::find(&table.name);
+        let reduced = definition.filter(|table| table::REDUCED.iter().any(|(_, known)| known.name() == table.name()));
+        let key = if reduced.is_some() { "gap" } else { &table.name };
         let own = spec.tables.get(key).and_then(|table| table.rtol);
-        let rtol = own.or(table::find(&table.name).and_then(|table| table.default_rtol()));
-        let rtol = rtol.unwrap_or(spec.accuracy.rtol);
+        let rtol = own.or(definition.and_then(Table::default_rtol)).unwrap_or(spec.accuracy.rtol);
         let Sample { mut rows, missing, fault } = sample::rows(&folder, manifest, table, sample, seed);
-        let relative = if rows.is_empty() { [false; 2] } else { relative(&spec, &folder, table)? };
-        let friction = sweep::friction(&spec.model).map_err(|error| VerifyError(error.to_string()))?;
-        let bounded = spec.model.velocity_bound && friction == Friction::Log;
+        let relative = relative(&folder, table);
         let context = Context { bounded, friction, relative, rtol };
         // Reduced rows are compared as they were written.
-        if let Some(table) = table::find(&table.name).filter(|_| !is_reduced) {
+        if let Some(table) = definition.filter(|_| reduced.is_none()) {
             rows.iter_mut().for_each(|(_, row)| scale(row, table, &units, relative));
         }
         let mut audit = Audit {
             table: table.name.clone(),
             rtol,
-            is_converted: !is_reduced && units != Units::Scaled,
+            is_converted: reduced.is_none() && units != Units::Scaled,
             rows: rows.len(),
             errors: 0,
             worst: Vec::new(),
@@ -116,18 +111,20 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             fault,
         };
         let check = |row: &mut CheckedRow<'_>| match table.name.as_str() {
-            "gap" => gap::check(row),
+            "gap" => shortcut::gap(row),
             "optimal" => optimal::check(row),
             "feedback" => feedback::check(row),
             "crossover" => crossover::check(row),
-            "best_cubic" => best_cubic::check(row),
-            "shortcut" => shortcut::check(row),
-            "compliant" => compliant::check(row),
-            "regularised" => regularised::check(row),
+            "best_cubic" => shortcut::best_cubic(row),
+            "shortcut" => shortcut::shortcut(row),
+            "compliant" => shortcut::compliant(row),
+            "regularised" => shortcut::regularised(row),
             "step_response" => step_response::check(row),
             "stability" => stability::check(row),
-            _ if is_reduced => reduced::check(row, &units, &spec),
-            _ => Err("there is no independent route for this table"),
+            _ => match reduced {
+                Some(table) => reduced::check(row, table, &units, &spec),
+                None => Err("there is no independent route for this table"),
+            },
         };
         for (number, row) in rows {
             let CheckedRow { differences, unchecked, .. } = CheckedRow::new(&row, context, check);
@@ -147,26 +144,14 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     Ok(audits)
 }
 
-/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration. The spec states it, since an edited part may have lost its units.
-fn relative(spec: &Spec, folder: &Folder, table: &ManifestTable) -> Result<[bool; 2], VerifyError> {
-    let has_points = spec.blocks().any(|(_, block)| block.points.is_some());
-    // Only the parts contain the points of a file.
-    let headings = match folder.parts_there(table).first() {
-        Some(&part) if has_points => {
-            frame::headings(&folder.part(&table.name, part)).map_err(|error| VerifyError(error.to_string()))?.0
-        }
-        _ => Vec::new(),
-    };
-    Ok([Quantity::Alpha2, Quantity::Alpha3].map(|coefficient| {
-        let (name, unit) = (coefficient.name(), coefficient.unit(Scale::Duration));
-        match spec.axis(name) {
-            Some(AxisSpec::Form(form)) => form.unit.as_deref() == Some(unit),
-            Some(_) => false,
-            // In any system of units.
-            None if has_points => headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")),
-            None => true,
-        }
-    }))
+/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration, by the units of its first part.
+fn relative(folder: &Folder, table: &ManifestTable) -> [bool; 2] {
+    let parts = folder.parts_there(table);
+    let headings = parts.iter().find_map(|&part| frame::headings(&folder.part(&table.name, part)).ok());
+    let headings = headings.map(|(headings, _)| headings).unwrap_or_default();
+    // In any system of units.
+    ["alpha_2", "alpha_3"]
+        .map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
 }
 
 impl Audit {

@@ -1,7 +1,6 @@
 //! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
-use super::CheckedRow;
-use crate::model::{Law, StateLaw};
+use crate::model::{Friction, Law, StateLaw};
 use crate::numerics::radau::{NODES, Nodes, radau};
 use crate::protocol::{Moment, Motion, SpringBlock};
 
@@ -86,13 +85,8 @@ impl Half {
 }
 
 impl Followed {
-    /// Follows a motion with ageing of a block on a spring, from steady sliding if the spring is elastic.
-    pub fn new(motion: Box<dyn Motion>, slider: &SpringBlock) -> Followed {
-        Followed::under(StateLaw::Ageing, motion, slider, 0)
-    }
-
-    /// Follows a motion under an evolution law of the state, and halves intervals that are not resolved up to `splits` times.
-    pub fn under(state_law: StateLaw, motion: Box<dyn Motion>, slider: &SpringBlock, splits: u32) -> Followed {
+    /// Follows a motion of a block on a spring under an evolution law of the state, and halves intervals that are not resolved up to `splits` times.
+    pub fn new(motion: Box<dyn Motion>, state_law: StateLaw, slider: &SpringBlock, splits: u32) -> Followed {
         let first = motion.at(0.0);
         let mut followed = Followed {
             state_law,
@@ -153,11 +147,12 @@ impl Followed {
 
     /// Adds half of an interval.
     fn add(&mut self, half: &Half) {
-        let SpringBlock { law: Law { a, b }, k, m } = self.slider;
+        let SpringBlock { law, k, m } = self.slider;
+        let (a, form) = (law.a, self.motion.friction());
         let Half { start, places, at, times, dt: [slopes, dt], rounded } = half;
         // Below the normal numbers a velocity has no logarithm.
         for Moment { v, theta, friction, .. } in at.iter().filter(|at| at.v >= f64::MIN_POSITIVE) {
-            let error = (1.0 + a * v.ln() + b * theta.ln() - friction).abs() / (1.0 + friction.abs());
+            let error = (tau(form, &law, *v, *theta) - friction).abs() / (1.0 + friction.abs());
             self.equation = self.equation.max(error);
         }
         if k.is_finite() {
@@ -248,22 +243,20 @@ impl Followed {
         -self.least(|moment| -f(moment))
     }
 
-    /// Compares the least and the greatest velocity, and returns the least.
-    pub fn compare_velocities(&self, row: &mut CheckedRow<'_>) -> f64 {
-        let least = self.least(|at| at.v);
-        row.compare("v_min", least);
-        row.compare("v_max", self.greatest(|at| at.v));
-        least
+    /// Least and greatest control velocity, that of the block where the spring is rigid.
+    pub fn control_range(&self) -> [f64; 2] {
+        let control = |at: &Moment| at.v_c.unwrap_or(at.v);
+        [self.least(control), self.greatest(control)]
     }
 
-    /// Compares the least and the greatest control velocity, that of the block where the spring is rigid, and returns the greatest magnitude.
-    pub fn compare_control(&self, row: &mut CheckedRow<'_>) -> f64 {
-        let control = |at: &Moment| at.v_c.unwrap_or(at.v);
-        let (least, greatest) = (self.least(control), self.greatest(control));
-        let size = least.abs().max(greatest.abs());
-        row.compare_relative("v_c_min", least, size);
-        row.compare_relative("v_c_max", greatest, size);
-        size
+    /// Greatest value of a function of the samples, at least 0.
+    pub fn worst(&self, f: impl Fn(&Moment) -> f64) -> f64 {
+        self.samples.iter().map(|(_, at)| f(at)).fold(0.0, f64::max)
+    }
+
+    /// Relative distance of theta at the end from steady sliding at `v_f`.
+    pub fn arrival(&self, v_f: f64) -> f64 {
+        (self.end().theta * v_f - 1.0).abs()
     }
 
     /// The time in the intervals whose middle is on a bound.
@@ -286,16 +279,19 @@ pub fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     0.5 * (low + high)
 }
 
-/// The least value on an interval, from `points` equal steps.
-pub fn lowest(f: &dyn Fn(f64) -> f64, (low, high): (f64, f64), points: u32) -> f64 {
-    let place = |index: u32| low + (high - low) * f64::from(index.min(points)) / f64::from(points);
-    let values = (0..=points).map(|index| (index, f(place(index))));
+/// Steps at whose ends a function is evaluated before its least value is refined. Chosen: many for each extremum of a cubic.
+const SCAN_STEPS: u32 = 2000;
+
+/// The least value on an interval.
+pub fn lowest(f: &dyn Fn(f64) -> f64, (low, high): (f64, f64)) -> f64 {
+    let place = |index: u32| low + (high - low) * f64::from(index.min(SCAN_STEPS)) / f64::from(SCAN_STEPS);
+    let values = (0..=SCAN_STEPS).map(|index| (index, f(place(index))));
     let (index, least) = values.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, f64::NAN));
     golden(f, place(index.saturating_sub(1)), place(index + 1)).1.min(least)
 }
 
 /// Position and value of the minimum in an interval that contains one.
-pub fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
+fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     let fraction = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..80 {
         let (left, right) = (high - fraction * (high - low), low + fraction * (high - low));
@@ -303,4 +299,16 @@ pub fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64)
     }
     let middle = 0.5 * (low + high);
     (middle, f(middle))
+}
+
+/// Friction by its definition.
+pub fn tau(form: Friction, law: &Law, v: f64, theta: f64) -> f64 {
+    let rest = 1.0 + law.b * theta.ln();
+    match form {
+        Friction::Log => law.a * v.ln() + rest,
+        Friction::Regularised => {
+            let ln_2z = v.ln() + rest / law.a;
+            law.a * if ln_2z > 30.0 { ln_2z } else { (0.5 * ln_2z.exp()).asinh() }
+        }
+    }
 }

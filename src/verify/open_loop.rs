@@ -4,16 +4,58 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::CheckedRow;
+use super::motion::Followed;
 use super::route::integrate;
 use crate::protocol::SpringBlock;
 
-/// The growth of errors in `(ln v, ln theta, k s/a)`.
-#[derive(Debug, Clone, Copy)]
-pub struct Growth {
-    /// Greatest factor from the start to the end.
-    pub whole: f64,
-    /// Greatest factor from any time to the end.
-    pub most: f64,
+/// Number of samples from which `sampling_error` is not checked. Chosen: limits the time of a check.
+const MAX_SAMPLES: f64 = 3000.0;
+
+/// Amplification below which the error is absolute. Chosen: smaller ones are differences of terms of size 1.
+const MIN_AMPLIFICATION: f64 = 1e-2;
+
+const TOO_STIFF: &str = "motions too stiff for an explicit integrator";
+
+/// Compares the columns of open-loop control of a traced protocol.
+pub fn compare(row: &mut CheckedRow<'_>, protocol: &ControlledProtocol, followed: &Followed) {
+    let (ControlledProtocol { slider, t_f, .. }, rtol) = (*protocol, row.context.rtol);
+    let dt = row.number("dt").unwrap_or(0.0);
+    if dt == 0.0 {
+        row.compare("sampling_error", None);
+    }
+    let columns = ["amplification", "sampling_error", "open_loop_error"];
+    if columns.iter().any(|column| row.is_missing(column) && (*column != "sampling_error" || dt > 0.0)) {
+        row.miss("numbers of a motion that was given up");
+    }
+    let [grown, held, closed] = columns.map(|column| row.number(column));
+    if grown.or(held).or(closed).is_none() {
+        return;
+    }
+    let is_stiff =
+        slider.m > 0.0 && slider.m * followed.least(|at| at.v) / slider.law.a < MIN_RELAXATION_FRACTION * t_f;
+    let Some([whole, most]) = (!is_stiff).then(|| protocol.growth()).flatten() else {
+        return row.miss(TOO_STIFF);
+    };
+    let scale = whole.max(MIN_AMPLIFICATION).max(1e-11 * most / rtol);
+    row.compare_number("amplification", whole, scale);
+    // The spring force under the greatest control alone, in units of a. Errors of the control act in proportion to it, and rounding in proportion to
+    // the greatest force of the motion.
+    let control = followed.control_range().map(f64::abs);
+    let reach = if slider.k.is_finite() { slider.k / slider.law.a * t_f * control[0].max(control[1]) } else { 0.0 };
+    // Effect at the end of an error rtol of the control at any time.
+    let felt = (1.0 + reach + 1e-14 / rtol * followed.force) * (1.0 + most);
+    let sampled = held.filter(|_| t_f / dt <= MAX_SAMPLES);
+    if held.is_some() && sampled.is_none() {
+        row.miss("controls sampled more than 3000 times");
+    }
+    for (column, written, dt) in [("open_loop_error", closed, None), ("sampling_error", sampled, Some(dt))] {
+        match written.map(|_| protocol.miss(dt)) {
+            Some(Some(expected)) => row.compare_number(column, expected, felt.max(expected)),
+            Some(None) => row.miss(TOO_STIFF),
+            None => {}
+        }
+    }
 }
 
 /// Relaxation time of the velocity, as a fraction of the protocol, below which the motion counts as stiff. Derived: an explicit
@@ -25,6 +67,7 @@ const ERROR_INTERVALS: usize = 256;
 
 /// The smooth shortcut as control of the spring, over the fraction `x` of the time: `ln(v - 1)` is a quintic between both ends, and
 /// `alpha x^3 (1 - x)^3`.
+#[derive(Debug, Clone, Copy)]
 pub struct ControlledProtocol {
     pub slider: SpringBlock,
     pub v_i: f64,
@@ -58,12 +101,6 @@ impl ControlledProtocol {
         v + (law.a * v1 / v + law.b * ((-ln_theta).exp() - v) + m * v2) / k
     }
 
-    /// Whether an explicit integrator cannot follow the block at its `least` velocity.
-    pub fn is_stiff(&self, least: f64) -> bool {
-        let SpringBlock { law, m, .. } = self.slider;
-        m > 0.0 && m * least / law.a < MIN_RELAXATION_FRACTION * self.t_f
-    }
-
     /// `ln theta` and the error at the end of the interval from `x` on, for an error in one variable at its start.
     fn piece(&self, x: f64, ln_theta: f64, unit: usize) -> Option<(f64, Vector3<f64>)> {
         let SpringBlock { law, k, m } = self.slider;
@@ -88,8 +125,8 @@ impl ControlledProtocol {
         Some((end[0], error))
     }
 
-    /// The growth of errors over the protocol.
-    pub fn growth(&self) -> Option<Growth> {
+    /// Greatest factors by which errors in `(ln v, ln theta, k s/a)` grow from the start to the end, and from any time to the end.
+    fn growth(&self) -> Option<[f64; 2]> {
         let SpringBlock { law, k, m } = self.slider;
         let (ratio, mut ln_theta) = (law.b / law.a, -self.v_i.ln());
         // Errors in all three variables due to an error of theta or of the spring force. A variable that depends on others has no error of its own.
@@ -115,12 +152,12 @@ impl ControlledProtocol {
             most = most.max(norm(&after));
         }
         let whole = norm(&after);
-        (whole.is_finite() && most.is_finite()).then_some(Growth { whole, most })
+        (whole.is_finite() && most.is_finite()).then_some([whole, most])
     }
 
     /// Distance from the target at the end, in `(ln v, ln theta, k s/a)`, of a block that starts in steady sliding, if the control is
     /// continuous, or sampled every `dt` and held.
-    pub fn miss(&self, dt: Option<f64>) -> Option<f64> {
+    fn miss(&self, dt: Option<f64>) -> Option<f64> {
         let &ControlledProtocol { slider: SpringBlock { law, k, m }, v_i, v_f, t_f, .. } = self;
         let (ratio, rigid) = (law.b / law.a, k == f64::INFINITY);
         // p = (k s - tau_ss(v_f))/a, y = ln(theta v_f), x = ln(v/v_f), the fraction of the time, and ln theta of the protocol.

@@ -1,6 +1,7 @@
 //! `optimal` for the laws of slip and of Perrin, Rice and Zheng: the arcs of the row, integrated from the equations, arrive with its work; the price
 //! of holding theta is least where the path turns or rests.
 
+use super::checked_row::NEGATIVE;
 use super::motion::{bisect, lowest};
 use super::route::integrate;
 use super::{Checked, CheckedRow};
@@ -15,9 +16,6 @@ const STEADY_SLIP: f64 = 60.0;
 
 /// Slip of the longest arc on the ceiling. Chosen: beyond, rounding of its end may decide the price there.
 const MAX_SLIP: f64 = 5000.0;
-
-/// Points of an arc at which its price is sampled. Chosen: a minimum is refined.
-const PRICE_POINTS: u32 = 256;
 
 /// Difference of `ln theta` at which a price is above its minimum. Chosen: a minimum is flat to half the digits.
 const PRICE_STEP: f64 = 1e-4;
@@ -202,8 +200,8 @@ fn bang_bang(row: &mut CheckedRow<'_>, block: &Block, arcs: &Arcs, strategy: &st
     if chatters {
         let around = [turn - PRICE_STEP, turn + PRICE_STEP].map(|w| block.price(w));
         row.push("price", if around.iter().all(|other| *other > price) { 0.0 } else { f64::INFINITY });
-    } else if !row.has_status("unproven") {
-        let least = |from: f64, to: f64| lowest(&|w| block.price(w), (from, to), PRICE_POINTS);
+    } else if !row.has_status("unproven") && !row.has_status(NEGATIVE) {
+        let least = |from: f64, to: f64| lowest(&|w| block.price(w), (from, to));
         let least = least(start, turn).min(least(turn, end));
         row.push("price", ((price - least) / price.abs()).max(0.0));
     }

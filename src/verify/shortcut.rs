@@ -1,16 +1,204 @@
-//! `shortcut`: the traced member obeys the equations and the formula of its family, and arrives.
+//! `gap`, `best_cubic`, `shortcut`, `compliant`, `regularised`: the traced protocol obeys the equations and its formula, arrives, and has the work
+//! and the velocities of the row; the gap is that to the traced optimum.
 
 use super::checked_row::NEGATIVE;
-use super::gap::{Cubic, place};
-use super::motion::Followed;
-use super::route::integrate;
+use super::motion::{Followed, lowest};
+use super::open_loop::{self, ControlledProtocol};
 use super::task::{Task, min_duration};
-use super::{Checked, CheckedRow};
-use crate::model::Transition;
-use crate::protocol::shortcut::{Case, find};
-use crate::protocol::{Moment, SpringBlock};
+use super::{Checked, CheckedRow, relaxed};
+use crate::model::{StateLaw, Transition};
+use crate::numerics::double_double::DoubleDouble;
+use crate::protocol::cubic::Landscape;
+use crate::protocol::optimal::Bounds;
+use crate::protocol::shortcut::Case;
+use crate::protocol::{Moment, SolverStats, Status};
+use crate::table::STATUS;
+use crate::trace::Absence;
 
-pub fn check(row: &mut CheckedRow<'_>) -> Checked {
+/// Times that an interval of a cubic may be halved. Chosen: the velocity of the slip law has kinks, to which halving leads.
+const CUBIC_SPLITS: u32 = 40;
+
+/// Relative rounding error of a square root of a number that rounding alone keeps from 0. Derived: the root of 1e-15, with room.
+const HALF_OF_THE_DIGITS: f64 = 1e-7;
+
+/// The traced protocol of a row of `table`, whose numbers are compared; `formula` adds its errors beyond those of the equations. `None`, and an
+/// error, if there is no protocol.
+fn follow(
+    row: &mut CheckedRow<'_>,
+    table: &str,
+    cubic: Option<&Cubic>,
+    formula: impl FnOnce(&mut CheckedRow<'_>, &Followed) -> f64,
+) -> Result<Option<Followed>, &'static str> {
+    let ((protocol, case), state) = (row.protocol(table)?, row.state_law()?);
+    let path = match protocol.path(&case, row.context.rtol) {
+        Ok(path) => path,
+        Err(Absence::Border) => return Err("cubics at the border, which have no motion"),
+        Err(_) => {
+            row.push("motion", f64::INFINITY);
+            return Ok(None);
+        }
+    };
+    let followed = Followed::new(path.motion, state, &row.slider()?, if cubic.is_some() { CUBIC_SPLITS } else { 0 });
+    let off = formula(row, &followed) + (followed.end().t / case.t_f - 1.0).abs();
+    row.push("motion", followed.equation + off);
+    row.push("control", followed.control);
+    row.compare("work", followed.work);
+    let [v_min, v_max] = [followed.least(|at| at.v), followed.greatest(|at| at.v)];
+    // The velocity of a cubic is a small difference of 1 and theta', over theta; where theta rises as fast as its law allows, it depends on the root
+    // of the rounding of the coefficients.
+    let noise = v_max * cubic.map_or(0.0, |cubic| cubic.rounding(state));
+    row.compare_relative("v_min", v_min, v_min + noise / row.context.rtol);
+    row.compare("v_max", v_max);
+    let friction_max = followed.greatest(|at| at.friction);
+    row.compare_relative("friction_max", friction_max, friction_max.abs().max(1.0));
+    if noise < v_min {
+        row.compare_friction(followed.least(|at| at.friction));
+    }
+    let [least, greatest] = followed.control_range();
+    row.compare_relative("v_c_min", least, least.abs().max(greatest.abs()));
+    row.compare_relative("v_c_max", greatest, least.abs().max(greatest.abs()));
+    Ok(Some(followed))
+}
+
+impl CheckedRow<'_> {
+    /// Compares the least work and the gap of the protocol `work` above it.
+    fn compare_gap(&mut self, least: f64, work: f64) {
+        self.compare("work_optimal", least);
+        // The promised error of the gap is relative to the greater of 1 and the gap.
+        let gap = (work - least) / least;
+        self.compare_relative("gap", gap, gap.abs().max(1.0));
+    }
+
+    /// Compares the least work and a gap of relative error `gap_rtol`, which the difference of two integrations determines to 1e-12 of the works.
+    fn compare_small_gap(&mut self, least: f64, followed: &Followed, gap_rtol: f64) {
+        self.compare("work_optimal", least);
+        let excess = followed.work - least;
+        let rounding = followed.rounding(|at| at.friction * at.v) + 1e-12 * (followed.work.abs() + least.abs());
+        let scale = (gap_rtol * excess.abs() + rounding) / self.context.rtol;
+        self.compare_relative("gap", excess / least, scale / least.abs());
+    }
+}
+
+/// A cubic theta over `x = t/t_f`.
+struct Cubic {
+    t_f: f64,
+    theta: [f64; 4],
+}
+
+impl Cubic {
+    fn new(&Transition { v_i, v_f, .. }: &Transition, t_f: f64, [a_2, a_3]: [f64; 2]) -> Cubic {
+        let theta_0 = 1.0 / v_i;
+        Cubic { t_f, theta: [theta_0, a_2, a_3, 1.0 / v_f - theta_0 - a_2 - a_3] }
+    }
+
+    fn theta(&self, x: f64) -> f64 {
+        self.theta.iter().rev().fold(0.0, |sum, c| sum * x + c)
+    }
+
+    /// The least value of theta and of the distance of `theta'` from its bound; not positive if there is no such shortcut.
+    fn slack(&self, state: StateLaw) -> f64 {
+        let bound = match state {
+            StateLaw::Ageing => 1.0,
+            StateLaw::Slip => (-1.0_f64).exp(),
+            StateLaw::Prz => 0.5,
+        };
+        let [_, c_1, c_2, c_3] = self.theta;
+        let rate = |x: f64| (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f;
+        lowest(&|x| self.theta(x).min(bound - rate(x)), (0.0, 1.0))
+    }
+
+    /// Rounding of the least velocity, relative to the greatest.
+    fn rounding(&self, state: StateLaw) -> f64 {
+        let has_root = state != StateLaw::Ageing && self.slack(state) < HALF_OF_THE_DIGITS;
+        if has_root { HALF_OF_THE_DIGITS } else { 16.0 * f64::EPSILON }
+    }
+
+    /// Greatest relative distance of theta along a motion from the cubic, beyond rounding.
+    fn off(&self, followed: &Followed) -> f64 {
+        let size: f64 = self.theta.iter().map(|c| c.abs()).sum();
+        followed.worst(|at| {
+            let off = (at.theta - self.theta(at.t / self.t_f)).abs() - 16.0 * f64::EPSILON * size;
+            (off / at.theta).max(0.0)
+        })
+    }
+}
+
+/// Checks a row of `gap`.
+pub fn gap(row: &mut CheckedRow<'_>) -> Checked {
+    let (task, state) = (Task::of(row)?, row.state_law()?);
+    let cubic = Cubic::new(&task.problem, task.t_f, row.coefficients(task.t_f).ok_or("an axis is missing")?);
+    let slack = cubic.slack(state);
+    if slack.abs() < 1e-9 {
+        return Err("within 1e-9 of the border of feasibility");
+    }
+    let relaxed = (state != StateLaw::Ageing).then(|| relaxed::certify(row, &task.problem, state, task.t_f));
+    let has_optimum = match &relaxed {
+        Some(optimum) => Some(optimum.status != Status::Infeasible),
+        None => task.is_feasible(),
+    };
+    if !row.compare_feasible(if slack <= 0.0 { Some(false) } else { has_optimum }) {
+        return Ok(());
+    }
+    let Some(followed) = follow(row, "gap", Some(&cubic), |_, followed| cubic.off(followed))? else { return Ok(()) };
+    let least = match relaxed {
+        Some(optimum) => optimum.value,
+        None => row.certify(&task).map(|optimum| optimum.work),
+    };
+    if let Some(least) = least {
+        row.compare_gap(least, followed.work);
+    }
+    Ok(())
+}
+
+/// Fractions of the coefficients by which a search for less work moves. Chosen: from a visible change to one whose effect on the work, of second order,
+/// is above rounding.
+const FRACTIONS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+
+/// Fractions that reach over the whole set where the work is not convex. Chosen: rings about twice as far from each other.
+const FAR_FRACTIONS: [f64; 5] = [0.2, 0.4, 0.8, 1.6, 3.2];
+
+/// Checks a row of `best_cubic`: no neighbour takes less work.
+pub fn best_cubic(row: &mut CheckedRow<'_>) -> Checked {
+    let (task, state, rtol) = (Task::of(row)?, row.state_law()?, row.context.rtol);
+    if !(row.has_status("ok") || row.has_status(NEGATIVE)) {
+        return Err("status is neither ok nor negative_friction");
+    }
+    let [a_2, a_3] = row.coefficients(task.t_f).ok_or("a coefficient was not written")?;
+    let cubic = Cubic::new(&task.problem, task.t_f, [a_2, a_3]);
+    let Some(followed) = follow(row, "best_cubic", Some(&cubic), |_, followed| cubic.off(followed))? else {
+        return Ok(());
+    };
+    if state != StateLaw::Ageing {
+        if let Some(least) = relaxed::certify(row, &task.problem, state, task.t_f).value {
+            row.compare_gap(least, followed.work);
+        }
+    } else if let Some(optimum) = row.certify(&task) {
+        row.compare_small_gap(optimum.work, &followed, 1e-7);
+    }
+    let landscape = Landscape::under(state, &task.problem, task.t_f, rtol);
+    let v_least = if row.context.bounded { 1.0 } else { 0.0 };
+    let work = |place: [f64; 2]| {
+        let place = place.map(DoubleDouble::new);
+        let near = landscape.point(place, row.context.friction, rtol, &mut SolverStats::default())?;
+        (near.v_min >= v_least).then_some(near.work)
+    };
+    let size = a_2.abs() + a_3.abs();
+    let far = if state == StateLaw::Ageing { &[][..] } else { &FAR_FRACTIONS };
+    let mut saved = 0.0_f64;
+    for fraction in FRACTIONS.iter().chain(far) {
+        for turn in 0..8 {
+            let (sin, cos) = (f64::from(turn) * std::f64::consts::FRAC_PI_4).sin_cos();
+            let near = work([a_2 + fraction * size * cos, a_3 + fraction * size * sin]);
+            saved = saved.max(near.map_or(0.0, |near| (followed.work - near) / followed.work.abs()));
+        }
+    }
+    // Differences below the error of a work are ignored.
+    row.push("beaten", if saved > rtol { saved } else { 0.0 });
+    Ok(())
+}
+
+/// Checks a row of `shortcut`.
+pub fn shortcut(row: &mut CheckedRow<'_>) -> Checked {
     let (problem, t_f, bounds) = (row.transition()?, row.axis("t_f")?, row.bounds());
     let name = row.word("family").ok_or("an axis is missing")?;
     let case = Case { transition: problem, t_f, tau_ceiling: bounds.tau_ceiling };
@@ -26,78 +214,30 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     if !has_numbers {
         return Ok(());
     }
-    let Some(Ok(motion)) = find(name).map(|family| family.motion(&case, row.context.rtol)) else {
-        row.push("motion", f64::INFINITY);
+    let Some(followed) = follow(row, "shortcut", None, |row, followed| formula(row, &case, name, followed))? else {
         return Ok(());
     };
-    let followed = Followed::new(motion, &SpringBlock { law: problem.law, k: f64::INFINITY, m: 0.0 });
-    let miss = followed.end().theta * problem.v_f - 1.0;
-    let formula = formula(row, &case, name, &followed);
-    let arrival = if name == "step" { 0.0 } else { miss.abs() };
-    row.push("motion", followed.equation + arrival + formula + (followed.end().t / t_f - 1.0).abs());
-    row.compare_relative("terminal_error", if name == "step" { miss } else { 0.0 }, 1.0);
-    row.compare("work", followed.work);
-    followed.compare_velocities(row);
-    let friction_max = followed.greatest(|at| at.friction);
-    row.compare_relative("friction_max", friction_max, friction_max.abs().max(1.0));
-    row.compare_friction(followed.least(|at| at.friction));
     // The optimum of this family has its ceiling.
     let bounds = if name == "bounded_friction" { bounds } else { bounds.without_ceilings() };
     if let Some(optimum) = row.certify(&Task::new(&problem, t_f, bounds)) {
-        row.compare_gap(optimum.work, Some(followed.work));
+        row.compare_gap(optimum.work, followed.work);
     }
     Ok(())
 }
 
-/// A family by the distance of its motions from a bound: the logarithm of that over the one at the start is `l p(x) + c q(x)`, `x = t/t_f`.
-pub struct Exponential<'a> {
-    pub t_f: f64,
-    /// Distance at the start.
-    pub first: f64,
-    pub l: f64,
-    /// `p` and `q`.
-    pub shape: fn(f64) -> [f64; 2],
-    /// Distance of a moment from the bound, and the size of its terms.
-    pub distance: &'a dyn Fn(&Moment) -> [f64; 2],
-    /// Relative rounding of the distances at the ends, in units of `8 eps`.
-    pub rounding: f64,
-}
-
-impl Exponential<'_> {
-    /// `c` by the moment that determines it best, with its rounding error, and the greatest distance from the formula along the motion.
-    pub fn fit(&self, followed: &Followed) -> Option<[f64; 3]> {
-        let moment = |(_, at): &(f64, Moment)| ((self.shape)(at.t / self.t_f), (self.distance)(at));
-        let moments: Vec<([f64; 2], [f64; 2])> = followed.samples.iter().map(moment).collect();
-        let coefficient = |&([p, q], [distance, size]): &([f64; 2], [f64; 2])| {
-            let noise = 8.0 * f64::EPSILON * (size / distance.abs() + self.l.abs() + self.rounding);
-            [((distance / self.first).ln() - self.l * p) / q, noise / q]
-        };
-        let determined = moments.iter().map(coefficient).filter(|fit| fit.iter().all(|number| number.is_finite()));
-        let [c, noise] = determined.min_by(|x, y| x[1].total_cmp(&y[1]))?;
-        let off = |&([p, q], [distance, size]): &([f64; 2], [f64; 2])| {
-            let expected = self.first * (self.l * p + c * q).exp();
-            ((distance - expected).abs() / size - noise * q * expected / size).max(0.0)
-        };
-        Some([c, noise, moments.iter().map(off).fold(0.0, f64::max)])
-    }
-}
-
-/// Compares `alpha`; the greatest distance from the formula of the family along the motion.
+/// Compares the parameter of a member of a family and its terminal error; its greatest distance from the formula of the family and from the target.
 fn formula(row: &mut CheckedRow<'_>, case: &Case, name: &str, followed: &Followed) -> f64 {
     let Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling } = *case;
-    let greatest = |off: &dyn Fn(&Moment) -> f64| followed.samples.iter().map(|(_, at)| off(at)).fold(0.0, f64::max);
+    if name == "step" {
+        row.compare_relative("terminal_error", followed.end().theta * v_f - 1.0, 1.0);
+        return followed.worst(|at| (at.v / v_f - 1.0).abs());
+    }
+    row.compare_relative("terminal_error", 0.0, 1.0);
     let shape = |x: f64| [x, x * (1.0 - x)];
     let over_floor = |at: &Moment| [at.v - 1.0, at.v];
     let under_ceiling = |at: &Moment| [tau_ceiling - at.friction, tau_ceiling.abs() + at.friction.abs()];
     let (family, unit) = match name {
-        "step" => return greatest(&|at| (at.v / v_f - 1.0).abs()),
-        "cubic" => {
-            let cubic = smooth_cubic(case);
-            // Theta and its slope are differences of numbers of the size of the greatest, and of that over the time.
-            let noise =
-                |at: &Moment| 16.0 * f64::EPSILON / v_i.min(v_f) * (1.0 / at.theta + 1.0 / (t_f * at.theta * at.v));
-            return greatest(&|at| ((at.v / cubic.velocity(place(at.t / t_f)) - 1.0).abs() - noise(at)).max(0.0));
-        }
+        "cubic" => return smooth_cubic(case).off(followed),
         "bounded_velocity" => {
             let l = ((v_f - 1.0) / (v_i - 1.0)).ln();
             (Exponential { t_f, first: v_i - 1.0, l, shape, distance: &over_floor, rounding: 0.0 }, -t_f * t_f)
@@ -105,7 +245,7 @@ fn formula(row: &mut CheckedRow<'_>, case: &Case, name: &str, followed: &Followe
         // A parabola, for which alpha is 0.
         _ if tau_ceiling == f64::INFINITY => {
             row.compare_relative("alpha", 0.0, 1.0);
-            return 0.0;
+            return followed.arrival(v_f);
         }
         _ => {
             let [first, last] = [v_i, v_f].map(|v| tau_ceiling - (1.0 + (law.a - law.b) * v.ln()));
@@ -113,9 +253,44 @@ fn formula(row: &mut CheckedRow<'_>, case: &Case, name: &str, followed: &Followe
             (Exponential { t_f, first, l: (last / first).ln(), shape, distance: &under_ceiling, rounding }, 1.0)
         }
     };
-    let Some([c, noise, off]) = family.fit(followed) else { return f64::INFINITY };
-    row.compare_relative("alpha", c / unit, (c.abs() + noise / row.context.rtol) / f64::abs(unit));
-    off
+    family.compare_alpha(row, followed, unit)[1] + followed.arrival(v_f)
+}
+
+/// A family by the distance of its motions from a bound: the logarithm of that over the one at the start is `l p(x) + c q(x)`, `x = t/t_f`.
+struct Exponential<'a> {
+    t_f: f64,
+    /// Distance at the start.
+    first: f64,
+    l: f64,
+    /// `p` and `q`.
+    shape: fn(f64) -> [f64; 2],
+    /// Distance of a moment from the bound, and the size of its terms.
+    distance: &'a dyn Fn(&Moment) -> [f64; 2],
+    /// Relative rounding of the distances at the ends, in units of `8 eps`.
+    rounding: f64,
+}
+
+impl Exponential<'_> {
+    /// Compares `alpha = c/unit` with `c` by the moment that determines it best; `alpha`, and the greatest distance from the formula along the motion.
+    fn compare_alpha(&self, row: &mut CheckedRow<'_>, followed: &Followed, unit: f64) -> [f64; 2] {
+        let terms = |at: &Moment| ((self.shape)(at.t / self.t_f), (self.distance)(at));
+        let coefficient = |(_, at): &(f64, Moment)| {
+            let ([p, q], [distance, size]) = terms(at);
+            let noise = 8.0 * f64::EPSILON * (size / distance.abs() + self.l.abs() + self.rounding);
+            [((distance / self.first).ln() - self.l * p) / q, noise / q]
+        };
+        let determined =
+            followed.samples.iter().map(coefficient).filter(|fit| fit.iter().all(|number| number.is_finite()));
+        let Some([c, noise]) = determined.min_by(|x, y| x[1].total_cmp(&y[1])) else { return [f64::INFINITY; 2] };
+        row.demand("alpha", true);
+        row.compare_relative("alpha", c / unit, (c.abs() + noise / row.context.rtol) / unit.abs());
+        let off = followed.worst(|at| {
+            let ([p, q], [distance, size]) = terms(at);
+            let expected = self.first * (self.l * p + c * q).exp();
+            ((distance - expected).abs() / size - noise * q * expected / size).max(0.0)
+        });
+        [c / unit, off]
+    }
 }
 
 /// The cubic shortcut without jumps of the velocity: theta changes as `3 x^2 - 2 x^3`.
@@ -130,35 +305,107 @@ const SIGN_RTOL: f64 = 1e-11;
 
 /// The bound that leaves the family without a member, from the extreme protocols of the family; `None` where rounding decides.
 fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static str>> {
-    let Case { transition: Transition { law, v_i, v_f }, t_f, tau_ceiling } = *case;
-    let settle = |bound: &'static str, room: f64, size: f64| match room / size {
-        room if room > SIGN_RTOL => Some(None),
-        room if room < -SIGN_RTOL => Some(Some(bound)),
-        _ => None,
-    };
-    let spare = settle("time", t_f - min_duration(&case.transition, true), t_f);
-    if bounded && v_f < v_i && spare != Some(None) {
-        return spare;
+    let Case { transition: problem, t_f, tau_ceiling } = *case;
+    let Transition { law, v_i, v_f } = problem;
+    // The room that each bound leaves, relative to the size of its terms.
+    let mut rooms = Vec::new();
+    if v_f < v_i && (bounded || family == "bounded_velocity") {
+        rooms.push(("time", t_f - min_duration(&problem, true), t_f));
     }
-    let steady = |v: f64| 1.0 + (law.a - law.b) * v.ln();
-    let highest = steady(v_i).max(steady(v_f));
     match family {
-        "cubic" => settle("velocity", smooth_cubic(case).slack(), 1.0),
-        "bounded_velocity" if v_f < v_i => spare,
-        "bounded_friction" => match settle("friction", tau_ceiling - highest, highest.abs() + 1.0) {
-            Some(None) if v_f > v_i && tau_ceiling.is_finite() => {
-                // With tau = tau_ceiling throughout, the time in which theta falls to its target, over ln theta.
-                let time = |y: &[f64; 2]| {
-                    let surplus = (tau_ceiling - 1.0) / law.a + (1.0 - law.b / law.a) * y[0];
-                    [-1.0, y[0].exp() / surplus.exp_m1()]
-                };
-                let least = integrate(time, [-v_i.ln(), 0.0], (0.0, (v_f / v_i).ln()))?[1];
-                settle("friction", t_f - least, t_f)
+        "cubic" => rooms.push(("velocity", smooth_cubic(case).slack(StateLaw::Ageing), 1.0)),
+        "bounded_friction" => {
+            let highest = [v_i, v_f].map(|v| 1.0 + (law.a - law.b) * v.ln()).into_iter().fold(f64::MIN, f64::max);
+            rooms.push(("friction", tau_ceiling - highest, highest.abs() + 1.0));
+            if v_f > v_i && tau_ceiling > highest {
+                let bounds = Bounds::new(false).with_tau_ceiling(tau_ceiling);
+                let least = Task::new(&problem, t_f, bounds).time_on_ceilings()?;
+                rooms.push(("friction", t_f - least, t_f));
+            } else if v_f < v_i {
+                // With v = 0 throughout, theta rises by the time.
+                rooms.push(("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f));
             }
-            // With v = 0 throughout, theta rises by the time.
-            Some(None) if v_f < v_i => settle("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f),
-            decided => decided,
-        },
-        _ => Some(None),
+        }
+        _ => {}
     }
+    for (bound, room, size) in rooms {
+        match room / size {
+            room if room < -SIGN_RTOL => return Some(Some(bound)),
+            room if room > SIGN_RTOL => {}
+            _ => return None,
+        }
+    }
+    Some(None)
+}
+
+/// Checks a row of `compliant`: its control moves the spring, also open loop.
+pub fn compliant(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, t_f, slider) = (row.transition()?, row.axis("t_f")?, row.slider()?);
+    if !row.compare_feasible(t_f > min_duration(&problem, true)) {
+        return Ok(());
+    }
+    let Transition { v_i, v_f, .. } = problem;
+    let family = Exponential {
+        t_f,
+        first: v_i - 1.0,
+        l: ((v_f - 1.0) / (v_i - 1.0)).ln(),
+        shape: |x| [x * x * x * (10.0 + x * (6.0 * x - 15.0)), (x * (1.0 - x)).powi(3)],
+        distance: &|at| [at.v - 1.0, at.v],
+        rounding: 0.0,
+    };
+    let mut found = f64::NAN;
+    let formula = |row: &mut CheckedRow<'_>, followed: &Followed| {
+        let [alpha, off] = family.compare_alpha(row, followed, 1.0);
+        found = alpha;
+        off + followed.arrival(v_f)
+    };
+    let Some(followed) = follow(row, "compliant", None, formula)? else { return Ok(()) };
+    let ratio = if slider.m > 0.0 { slider.k * t_f * t_f / slider.m } else { f64::INFINITY };
+    row.compare("stiffness_ratio", ratio);
+    let protocol = ControlledProtocol { slider, v_i, v_f, t_f, alpha: row.number("alpha").unwrap_or(found) };
+    open_loop::compare(row, &protocol, &followed);
+    if let Some(optimum) = row.certify(&Task::new(&problem, t_f, row.context.bounded)) {
+        row.compare_gap(optimum.work, followed.work);
+    }
+    Ok(())
+}
+
+/// Checks a row of `regularised`: off its pieces the protocol is the optimum.
+pub fn regularised(row: &mut CheckedRow<'_>) -> Checked {
+    let (problem, t_f, delta_t) = (row.transition()?, row.axis("t_f")?, row.axis("delta_t")?);
+    let (bounded, rtol) = (row.context.bounded, row.context.rtol);
+    let overlaps = 2.0 * delta_t > t_f || bounded && t_f < min_duration(&problem, true);
+    let infeasible = row.has_status("infeasible");
+    if infeasible && !overlaps && !bounded {
+        return Err("optima that nearly come to rest");
+    }
+    if overlaps || infeasible {
+        row.compare_feasible(!overlaps);
+        return Ok(());
+    }
+    if row.has_status("unproven") {
+        return Err("status is unproven");
+    }
+    ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| row.demand(column, true));
+    let Some(optimum) = row.certify(&Task::new(&problem, t_f, bounded)) else { return Ok(()) };
+    let corner = if bounded { optimum.motion.time_on(|at| at.v == 1.0) } else { 0.0 };
+    // How far the protocol is from the optimum, on the floor up to the corner, where no piece replaces it.
+    let piece = delta_t * (1.0 + rtol);
+    let drift = |at: &Moment| {
+        let replaced = at.t <= piece || at.t >= t_f - piece || corner > 0.0 && (at.t - corner).abs() <= piece;
+        let (kinetic, press) = (problem.law.a * at.v, (at.friction + problem.law.a) / at.theta);
+        match () {
+            () if replaced => 0.0,
+            () if at.t < corner => (at.v - 1.0).abs(),
+            () => (kinetic - press - optimum.c).abs() / (kinetic.abs() + press.abs()),
+        }
+    };
+    let formula = |_: &mut CheckedRow<'_>, followed: &Followed| followed.worst(drift) + followed.arrival(problem.v_f);
+    let Some(followed) = follow(row, "regularised", None, formula)? else { return Ok(()) };
+    row.compare_small_gap(optimum.work, &followed, rtol);
+    let (least, friction_min) = (followed.least(|at| at.v), followed.least(|at| at.friction));
+    if (least - 1.0).abs() > 100.0 * rtol && friction_min > 0.0 {
+        row.compare_word(STATUS, if least < 1.0 { "below_bound" } else { "ok" });
+    }
+    Ok(())
 }

@@ -1,7 +1,7 @@
 //! `stability`: the roots of the characteristic polynomial with 32 digits: a real one by bisection, the others from what is left.
 
-use super::motion::bisect;
-use super::{Checked, CheckedRow, arcsinh, hopf};
+use super::motion::{bisect, tau};
+use super::{Checked, CheckedRow, hopf};
 use crate::model::{Friction, Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
 
@@ -56,7 +56,12 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
     let friction = row.context.friction;
     let law = |v: f64| match friction {
         Friction::Log => problem.law,
-        Friction::Regularised => arcsinh::linearised(&problem.law, v),
+        // The logarithm with the same derivatives at steady sliding.
+        Friction::Regularised => {
+            let Law { a, b } = problem.law;
+            let reduced = (tau(friction, &problem.law, v, 1.0 / v) / a).tanh();
+            Law { a: a * reduced, b: b * reduced }
+        }
     };
     let critical = |v: f64| {
         let (a, b) = (double(law(v).a), double(law(v).b));

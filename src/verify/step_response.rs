@@ -174,7 +174,7 @@ fn follow(row: &mut CheckedRow<'_>, step: VelocityStep) -> Result<Followed, &'st
     let motion = motion.filter(|motion| motion.landmarks().len() <= MAX_INTERVALS);
     let motion = motion.ok_or("responses of more than 10,000 steps")?;
     let VelocityStep { state_law, transition: Transition { law, .. }, k, m } = step;
-    let followed = Followed::under(state_law, Box::new(motion), &SpringBlock { law, k, m }, 0);
+    let followed = Followed::new(Box::new(motion), state_law, &SpringBlock { law, k, m }, 0);
     row.push("motion", followed.equation);
     row.push("control", followed.control);
     Ok(followed)

@@ -2,9 +2,9 @@
 
 use super::CheckedRow;
 use super::route::integrate;
-use crate::model::{Transition, friction_margin};
+use crate::model::{Friction, Transition, friction_margin};
 use crate::protocol::optimal::Bounds;
-use crate::protocol::{Motion, Status, optimal};
+use crate::protocol::{Motion, Status, arcsinh, optimal};
 
 /// A transition to steady sliding in a given time, under bounds.
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +14,7 @@ pub struct Task {
     pub theta: Option<f64>,
     pub t_f: f64,
     pub bounds: Bounds,
+    pub form: Friction,
 }
 
 /// Least and greatest feasible time, or the ceiling that allows none, if it is one alone.
@@ -33,19 +34,24 @@ const MOTION_RTOL: f64 = 1e-12;
 const SMALL_TIME: f64 = 1e-3;
 
 impl Task {
-    /// The transition between steady sliding.
+    /// The transition between steady sliding with logarithmic friction.
     pub fn new(problem: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Task {
-        Task { problem: *problem, theta: None, t_f, bounds: bounds.into() }
+        Task { problem: *problem, theta: None, t_f, bounds: bounds.into(), form: Friction::Log }
     }
 
     /// That of a row.
     pub fn of(row: &CheckedRow<'_>) -> Result<Task, &'static str> {
-        Ok(Task::new(&row.transition()?, row.axis("t_f")?, row.bounds()))
+        let task = Task::new(&row.transition()?, row.axis("t_f")?, row.bounds());
+        Ok(Task { form: row.context.friction, ..task })
     }
 
     /// The status of the optimum, and its motion.
     pub fn solve(&self) -> (Status, Option<Box<dyn Motion>>) {
-        let Task { ref problem, theta, t_f, bounds } = *self;
+        let Task { ref problem, theta, t_f, bounds, form } = *self;
+        if form == Friction::Regularised {
+            let (solved, motion) = arcsinh::motion(problem, t_f);
+            return (solved.status, motion);
+        }
         let (solved, motion) = match theta {
             Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, MOTION_RTOL),
             None => optimal::motion(problem, t_f, bounds, MOTION_RTOL),
@@ -105,7 +111,7 @@ impl Task {
     }
 
     /// Time on the ceilings from one end to the other.
-    fn time_on_ceilings(&self) -> Option<f64> {
+    pub fn time_on_ceilings(&self) -> Option<f64> {
         let (way, cap) = (self.way(), self.cap());
         let rate = |part: f64| -way * self.from() * (part * way).exp() / cap(part).exp_m1();
         // The rate has a kink where the ceilings cross, and rounding makes it jump where the nearer end changes.
@@ -186,6 +192,9 @@ impl Task {
                     row.compare_word("bound", if self.t_f <= least { "too_fast" } else { "too_slow" });
                 }
             }
+        }
+        if self.form == Friction::Regularised {
+            return;
         }
         let by_v = |v_ceiling: f64| Task { bounds: Bounds { v_ceiling, ..self.bounds }, ..*self }.is_feasible();
         let by_tau = |tau_ceiling: f64| Task { bounds: Bounds { tau_ceiling, ..self.bounds }, ..*self }.is_feasible();

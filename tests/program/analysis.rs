@@ -369,7 +369,7 @@ fn wrong_paths_and_names() {
         refused(folder.path(), &["query", "results/test", "SELECT 1", "--out", "x.pdf"]),
         (1, message.to_owned())
     );
-    let message = "error: empty: a folder without a dataset, not a dataset\n  expected: the folder of a dataset, such as \
+    let message = "error: empty: a file or folder of another kind\n  expected: the folder of a dataset, such as \
                    results/NAME\n  help: name a folder that `slipsweep run` wrote\n";
     assert_eq!(refused(folder.path(), &["summary", "empty"]), (1, message.to_owned()));
 }
@@ -531,31 +531,6 @@ fn regress_answers_are_those_of_standard_sql() {
     assert_eq!(json, "{\"v_f\":100.0,\"all_of\":[0.02,0.037,0.049]}\n");
     let infinite = "SELECT 1.0 / (t_f - t_f) AS x FROM best_cubic LIMIT 1";
     assert_eq!(printed(folder.path(), &["query", "results/test", infinite, "--format", "jsonl"]), "{\"x\":\"inf\"}\n");
-}
-
-#[test]
-fn rows_without_numbers_lead_to_rows_with_numbers() {
-    let folder = landscape();
-    let head = printed(folder.path(), &["head", "results/test", "gap", "-n", "3"]);
-    let (_, query) = head.split_once("  the first rows with numbers: slipsweep query results/test \"").expect("a hint");
-    let answer = printed(folder.path(), &["query", "results/test", query.trim_end().trim_end_matches('"')]);
-    assert_eq!((answer.lines().count(), answer.matches(" ok").count()), (5, 3), "{answer}");
-    assert!(!printed(folder.path(), &["head", "results/test", "optimal"]).contains("the first rows with numbers"));
-}
-
-/// The best cubic of the paper peaks above 300.
-#[test]
-fn a_gap_below_zero_is_explained() {
-    for (ceiling, is_explained) in [("300.0", true), ("inf", false)] {
-        let axes = format!("t_f = 0.02\n{MATERIAL}v_ceiling = {ceiling}\n");
-        let folder = dataset(&axes, "[tables.best_cubic]\n");
-        let summary = printed(folder.path(), &["summary", "results/test"]);
-        assert_eq!(
-            summary.contains("a negative gap: the shortcut is faster than v_ceiling"),
-            is_explained,
-            "{summary}"
-        );
-    }
 }
 
 #[test]

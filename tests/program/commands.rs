@@ -282,23 +282,6 @@ fn a_command_that_reads_can_be_stopped() {
     }
 }
 
-/// Commands and options of other programs lead to ours.
-#[test]
-fn words_of_other_programs_lead_to_commands() {
-    let folder = tempfile::tempdir().expect("is writable");
-    for (arguments, tip) in [
-        (&["check", "spec.toml"][..], "'plan'"),
-        (&["show", "results/test"], "'head'"),
-        (&["export", "results/test"], "'query'"),
-        (&["run", "spec.toml", "--resume"], "`slipsweep run` resumes by itself: it computes only what is missing"),
-        (&["run", "spec.toml", "--jobs", "2"], "'--threads'"),
-    ] {
-        let output = slipsweep(folder.path()).args(arguments).output().expect("runs");
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.code() == Some(1) && message.contains(tip), "{arguments:?}: {message}");
-    }
-}
-
 /// Both exit codes of a run that is stopped stand where a user looks for them.
 #[test]
 fn exit_codes_are_documented() {

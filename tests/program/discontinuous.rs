@@ -180,13 +180,11 @@ fn regress_what_is_too_large_is_refused() {
     let spec = format!("name = \"test\"\n# {}\n", "-".repeat(1 << 22));
     assert_eq!(fault(&spec, b""), "spec.toml: too long");
     let key = "v".repeat(1 << 20);
-    assert_eq!(
-        fault(&format!("name = \"test\"\n[axes]\n{key} = 1\n"), b""),
-        format!("spec.toml:3: axes.{}...: unknown axis `{}...`", &key[..195], &key[..100])
-    );
+    let unknown = fault(&format!("name = \"test\"\n[axes]\n{key} = 1\n[tables.optimal]\n"), b"");
+    assert!(unknown.starts_with("spec.toml:3: axes.vvvv") && unknown.ends_with("vvvv..."), "{unknown}");
     let points = "name = \"test\"\npoints = \"points.csv\"\n[tables.stability]\n";
-    assert!(fault(points, "v".repeat(1 << 24).as_bytes()).contains("points.csv:1: unknown axis `vvvv"));
-    assert!(fault(points, format!("a\n{}", ",".repeat(1 << 24)).as_bytes()).ends_with("16777217 values for 1 column"));
+    assert!(fault(points, format!("{}\n1", "v".repeat(1 << 24)).as_bytes()).contains("points.csv: unknown axis `vvvv"));
+    assert!(fault(points, format!("a\n{}", ",".repeat(1 << 24)).as_bytes()).ends_with("16777217 values for 1 columns"));
     assert!(fault(points, b"a\x1b[2J\n1").contains("unknown axis `a\\u{1b}[2J`"));
     assert_eq!(fault(&"a.".repeat(1 << 20), b"").get(..14), Some("spec.toml:1: n"));
     assert_eq!(fault(&format!("name = {}", "[".repeat(1 << 20)), b"").get(..14), Some("spec.toml:1: n"));

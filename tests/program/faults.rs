@@ -79,6 +79,38 @@ fn a_part_that_is_cut_is_found_by_any_look() {
     }
 }
 
+/// Files of points of several writers, without checksums: damage that goes unnoticed may be read, but never ends the process.
+#[test]
+fn damaged_points_are_read_or_refused() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let path = folder.path().join("points.parquet");
+    let spec = "name = \"points\"\npoints = \"points.parquet\"\n[tables.optimal]\n";
+    let mut next = numbers();
+    let read = |bytes: &[u8]| {
+        fs::write(&path, bytes).expect("is writable");
+        Sweep::parse(spec, folder.path()).err().map(|error| error.to_string())
+    };
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/points");
+    for sample in fs::read_dir(samples).expect("is there") {
+        let sample = sample.expect("is readable").path();
+        let good = fs::read(&sample).expect("is there");
+        for length in (0..good.len()).step_by(7) {
+            let reported = read(&good[..length]).expect("is cut");
+            assert!(reported.contains("cannot read "), "{}, {length}: {reported}", sample.display());
+        }
+        for _ in 0..300 {
+            let mut bad = good.clone();
+            let (at, length) = (next(good.len()), 1 << next(6));
+            for byte in bad.iter_mut().skip(at).take(length) {
+                *byte = if length == 1 { *byte ^ 1 << next(8) } else { next(256) as u8 };
+            }
+            if let Some(reported) = read(&bad) {
+                assert!(reported.len() < 4096, "{}: {reported}", sample.display());
+            }
+        }
+    }
+}
+
 #[test]
 fn damaged_and_missing_parts_are_made_again() {
     let folder = tempfile::tempdir().expect("is writable");
@@ -224,7 +256,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
     };
     fs::remove_file(&path).expect("is there");
     fs::create_dir(&path).expect("is writable");
-    stranger(&path, "a folder");
+    stranger(&path, "a folder, not a file");
     let status = said(&slipsweep(folder.path()).args(["status", "test"]).output().expect("runs"));
     assert_eq!(status.0, Some(2), "{status:?}");
     fs::remove_dir(&path).expect("is there");
@@ -238,7 +270,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
             std::thread::spawn(move || drop(fs::OpenOptions::new().write(true).open(path)));
         };
         pipe(&path);
-        stranger(&path, "a device, a named pipe or the like");
+        stranger(&path, "a device or a named pipe, not a file");
         // One that bears the name of a temporary file of this machine is not opened either.
         let machine = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         let odd = path.with_file_name(format!(".part-000000.parquet.1-0@{}.tmp", machine.trim()));
@@ -249,7 +281,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
         fs::remove_file(&odd).expect("is there");
         fs::remove_file(&path).expect("is there");
         std::os::unix::fs::symlink("/dev/zero", &path).expect("is writable");
-        stranger(&path, "a device, a named pipe or the like");
+        stranger(&path, "a device or a named pipe, not a file");
         fs::remove_file(&path).expect("is there");
         let manifest = folder.path().join("test/manifest.json");
         let reported = fs::read(&manifest).expect("is there");
@@ -266,5 +298,5 @@ fn regress_what_is_no_file_is_never_waited_for() {
 }
 
 /// The report of `status` on a manifest that is not a file.
-const UNREADABLE: &str = "test/manifest.json: cannot read: it is not a file\n  help: solve this and run the same command again, which keeps \
+const UNREADABLE: &str = "test/manifest.json: cannot read: a device or a named pipe, not a file\n  help: solve this and run the same command again, which keeps \
                           finished parts; or write elsewhere with --out DIR\n";

@@ -68,16 +68,6 @@ fn a_table_names_its_columns_and_units() {
 }
 
 #[test]
-fn times_that_nine_digits_do_not_distinguish_are_shown_in_full() {
-    let late = ["--t-f", "1000", "--a", "1e-3", "--b", "2e-3", "--v-i", "3", "--v-f", "1e6"];
-    let text = shown(&[&["optimal"], &late]);
-    let rows = text.lines().skip_while(|line| !line.starts_with("  t ")).skip(2);
-    let times: Vec<&str> = rows.filter_map(|row| row.split_whitespace().next()).collect();
-    let inside = &times[1..times.len() - 1];
-    assert!(inside.len() > 100 && inside.windows(2).all(|pair| pair[0] != pair[1]), "{text}");
-}
-
-#[test]
 fn csv_reads_back_the_same_numbers_and_parquet_too() {
     let folder = tempfile::tempdir().expect("is writable");
     for name in ["optimal", "best_cubic", "bounded_velocity", "compliant"] {
@@ -179,7 +169,7 @@ fn wrong_arguments_get_one_clear_message() {
         (&[&["cubic", "--friction", "regularised"], UP], "error: `cubic` does not support regularised friction"),
         (
             &[&["optimal", "--friction", "regularised", "--law", "slip"], UP],
-            "error: --law does not support regularised friction",
+            "error: regularised friction takes no --law",
         ),
         (
             &[&["optimal", "--friction", "Log"], UP],
@@ -209,9 +199,6 @@ fn wrong_arguments_get_one_clear_message() {
     for (arguments, expected) in cases {
         assert_eq!(complaint(arguments), (Some(1), expected.to_owned()));
     }
-    let in_si = trace(Path::new("."), &[&["optimal", "--v-ceiling", "1e-7"], UP]);
-    let help = "\n  help: velocities are in units of v_0; divide m/s by v_0\n";
-    assert!(String::from_utf8_lossy(&in_si.stderr).contains(help), "{in_si:?}");
 }
 
 #[test]
@@ -493,7 +480,7 @@ fn a_row_without_a_path_states_why() {
         assert!(text.contains("  row 0 is infeasible: t_f = 0.001 is too short for v >= 1: the least is "), "{text}");
     }
     assert!(complaint(&["optimal", "--where", "t_f=7"]).contains("\n  help: the nearest rows have --where \"t_f="));
-    assert!(complaint(&["optimal", "--where", "t_f>0"]).contains("help: --row 0, or a condition on t_f, v_i"));
+    assert!(complaint(&["optimal", "--where", "t_f>0"]).contains("help: --row 0, or a further condition"));
     assert!(complaint(&["step_response", "--row", "0"]).contains("has no duration of its own\n  help: add --t-f T"));
 }
 

@@ -1,7 +1,5 @@
 //! The parser of expressions: SQL conditions, restricted to arithmetic and comparisons.
 
-use std::fmt::Display;
-
 use sqlparser::ast::{
     BinaryOperator, CeilFloorKind, DateTimeField, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments,
     Ident, Spanned, UnaryOperator, Value,
@@ -10,7 +8,7 @@ use sqlparser::dialect::PostgreSqlDialect;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::Token;
 
-use super::super::block::{Factor, Label};
+use super::super::block::Factor;
 use super::super::quantity::Quantity;
 use super::program::{Binary, Expression, Op, Unary};
 use crate::names::nearest;
@@ -20,7 +18,10 @@ const MAX_BYTES: usize = 1000;
 
 /// Greatest number of nested parentheses. The time of `sqlparser` 0.62 doubles with each
 /// nested function: `abs(abs(...))` takes milliseconds at 10, seconds at 18.
-const MAX_NESTED_PARENTHESES: usize = 10;
+const MAX_NESTED_PARENTHESES: i32 = 10;
+
+/// Greatest number of names in a message: labels of points may have millions of words. Chosen: two lines of text.
+const MAX_SHOWN_NAMES: usize = 20;
 
 /// The fault of an expression.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,31 +50,29 @@ impl Fault {
     fn unknown(position: Option<u64>, what: &str, name: &str, known: &[&str]) -> Fault {
         let meant = nearest(name, known.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
         let help = meant.unwrap_or_else(|| "remove it, or choose one of these".to_owned());
-        Fault::new(position, format!("unknown {what} `{name}`"), known.join(", "), help)
+        let shown = known[..known.len().min(MAX_SHOWN_NAMES)].join(", ");
+        let expected = if known.len() > MAX_SHOWN_NAMES { format!("{shown}, ...") } else { shown };
+        Fault::new(position, format!("unknown {what} `{name}`"), expected, help)
     }
 }
 
-/// Functions of one number. `log` follows SQL.
-const UNARY: [(&str, Unary); 9] = [
-    ("abs", Unary::Abs),
-    ("sqrt", Unary::Sqrt),
-    ("exp", Unary::Exp),
-    ("ln", Unary::Ln),
-    ("log10", Unary::Log10),
-    ("log", Unary::Log10),
-    ("floor", Unary::Floor),
-    ("ceil", Unary::Ceil),
-    ("ceiling", Unary::Ceil),
-];
-
-/// Functions of two numbers, in both spellings of SQL. All but powers take more arguments.
-const BINARY: [(&str, Binary); 6] = [
-    ("min", Binary::Min),
-    ("least", Binary::Min),
-    ("max", Binary::Max),
-    ("greatest", Binary::Max),
-    ("pow", Binary::Power),
-    ("power", Binary::Power),
+/// Functions, in both spellings of SQL. `log` follows SQL. Minimum and maximum take two or more arguments.
+const FUNCTIONS: [(&str, Op); 15] = [
+    ("abs", Op::Unary(Unary::Abs)),
+    ("sqrt", Op::Unary(Unary::Sqrt)),
+    ("exp", Op::Unary(Unary::Exp)),
+    ("ln", Op::Unary(Unary::Ln)),
+    ("log10", Op::Unary(Unary::Log10)),
+    ("log", Op::Unary(Unary::Log10)),
+    ("floor", Op::Unary(Unary::Floor)),
+    ("ceil", Op::Unary(Unary::Ceil)),
+    ("ceiling", Op::Unary(Unary::Ceil)),
+    ("min", Op::Binary(Binary::Min)),
+    ("least", Op::Binary(Binary::Min)),
+    ("max", Op::Binary(Binary::Max)),
+    ("greatest", Op::Binary(Binary::Max)),
+    ("pow", Op::Binary(Binary::Power)),
+    ("power", Op::Binary(Binary::Power)),
 ];
 
 /// The grammar, for messages.
@@ -121,31 +120,18 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
         let found = format!("{} characters", text.chars().count());
         return Err(Fault::new(None, found, format!("at most {MAX_BYTES}"), "shorten the expression"));
     }
-    let mut nested = 0_usize;
-    let deep = text.chars().position(|c| {
-        match c {
-            '(' => nested += 1,
-            ')' => nested = nested.saturating_sub(1),
-            _ => {}
-        }
-        nested > MAX_NESTED_PARENTHESES
+    let depths = text.bytes().scan(0, |depth, byte| {
+        *depth += i32::from(byte == b'(') - i32::from(byte == b')');
+        Some(*depth)
     });
-    if let Some(place) = deep {
+    if depths.max() > Some(MAX_NESTED_PARENTHESES) {
         let expected = format!("at most {MAX_NESTED_PARENTHESES} nested");
-        return Err(Fault::new(
-            Some(place as u64 + 1),
-            "parentheses nested too deeply",
-            expected,
-            "remove parentheses",
-        ));
+        return Err(Fault::new(None, "parentheses nested too deeply", expected, "remove parentheses"));
     }
     // The first two begin SQL comments, which would hide the rest.
     let foreign = [("--", "put a space or parentheses between"), ("/*", "remove it"), ("**", "write `^` for a power")];
-    for (sign, help) in foreign {
-        if let Some(place) = text.find(sign) {
-            let position = text[..place].chars().count() as u64 + 1;
-            return Err(Fault::new(Some(position), format!("unexpected `{sign}`"), GRAMMAR, help));
-        }
+    if let Some((sign, help)) = foreign.into_iter().find(|(sign, _)| text.contains(sign)) {
+        return Err(Fault::new(None, format!("unexpected `{sign}`"), GRAMMAR, help));
     }
     // One line, so that a column is a position.
     let line: String = text.chars().map(|c| if c.is_whitespace() { ' ' } else { c }).collect();
@@ -153,54 +139,32 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
         let expression = parser.parse_expr()?;
         Ok((expression, parser.next_token()))
     });
-    let (expression, rest) = parsed.map_err(|error| syntax(&line, error))?;
+    let (expression, rest) = parsed.map_err(|error| syntax(&error))?;
     if rest.token != Token::EOF {
         let found = format!("`{}` after the end of `{expression}`", rest.token);
-        let help = match rest.token {
-            Token::Assignment | Token::SemiColon => "remove it",
-            _ => "put an operator between, or remove it",
-        };
+        let help = "put an operator between, or remove it";
         return Err(Fault::new(Some(rest.span.start.column), found, "nothing more", help));
     }
-    let mut compiler = Compiler { line: &line, axes, points, program: Vec::new() };
+    let mut compiler = Compiler { axes, points, program: Vec::new() };
     let kind = compiler.compile(&expression)?;
     Ok((Expression { program: compiler.program }, kind))
 }
 
 /// The message of the parser, simplified.
-fn syntax(line: &str, error: ParserError) -> Fault {
-    let message = match error {
-        // Parentheses never reach it.
-        ParserError::RecursionLimitExceeded => {
-            return Fault::new(None, "operators nested too deeply", "fewer operators", "remove operators");
-        }
-        ParserError::TokenizerError(message) | ParserError::ParserError(message) => message,
-    };
-    let (said, column) = message.split_once(" at Line: 1, Column: ").unwrap_or((&message, ""));
-    let position = column.trim().parse().ok();
-    let said = said.replace("Expected: ", "expected ").replace("found: ", "found ");
-    let (found, position) = if said.ends_with("EOF") {
-        let end = line.chars().count() as u64 + 1;
-        (
-            if line.trim().is_empty() { "the expression is empty" } else { "the expression ends too early" }.to_owned(),
-            Some(end),
-        )
-    } else {
-        (said, position)
-    };
-    Fault::new(position, found, GRAMMAR, "correct the expression")
+fn syntax(error: &ParserError) -> Fault {
+    let message = error.to_string().replace("sql parser error: ", "").replace("Expected: ", "expected ");
+    let message = message.replace("found: ", "found ").replace("EOF", "the end of the expression");
+    let (found, column) = message.split_once(" at Line: 1, Column: ").unwrap_or((&message, ""));
+    Fault::new(column.trim().parse().ok(), found, GRAMMAR, "correct the expression")
 }
 
 /// A number or a truth.
 fn literal(value: &Value, expression: &Expr) -> Result<(f64, Kind), Fault> {
     match value {
-        Value::Number(digits, false) => match digits.parse() {
-            Ok(number) if f64::is_finite(number) => Ok((number, Kind::Number)),
-            _ => {
-                let found = format!("`{digits}` is beyond the range of numbers");
-                Err(Fault::new(position(expression), found, "a number", "write `inf` for infinity"))
-            }
-        },
+        Value::Number(digits, false) => {
+            let number = digits.parse().ok().filter(|number| f64::is_finite(*number));
+            number.map(|number| (number, Kind::Number)).ok_or_else(|| foreign(expression))
+        }
         Value::Boolean(is) => Ok((f64::from(u8::from(*is)), Kind::Truth)),
         _ => Err(foreign(expression)),
     }
@@ -219,7 +183,6 @@ fn plain(call: &Function) -> Option<(&str, Vec<&Expr>)> {
 }
 
 struct Compiler<'a> {
-    line: &'a str,
     axes: &'a [Quantity],
     points: Option<&'a Factor>,
     program: Vec<Op>,
@@ -290,36 +253,29 @@ impl Compiler<'_> {
         if name.value == "inf" {
             return Ok(Op::Number(f64::INFINITY));
         }
-        let wordy = |found: String, name: &dyn Display, word: &str| {
-            Fault::new(position(expression), found, "a comparison with a word", format!("write `{name} = '{word}'`"))
-        };
-        if let Some((_, _, label)) = self.label(&name.value) {
-            let word = label.words.first().map_or("", String::as_str);
-            return Err(wordy(format!("`{name}` is a label"), name, word));
-        }
-        if name.quote_style.is_some() {
-            return Err(foreign(expression));
-        }
-        let quantity = self.axis(&name.value, expression)?;
-        match quantity.words().first() {
-            Some(word) => Err(wordy(format!("`{}` is an axis of words", quantity.name()), &quantity.name(), word)),
-            None => Ok(Op::Axis(quantity)),
-        }
+        let (operand, words) = self.variable(name, expression)?;
+        let Some(word) = words.first() else { return Ok(operand) };
+        let what = if matches!(operand, Op::Label { .. }) { "a label" } else { "an axis of words" };
+        let help = format!("write `{} = '{word}'`", name.value);
+        Err(Fault::new(position(expression), format!("`{}` is {what}", name.value), "a comparison with a word", help))
     }
 
-    fn axis(&self, name: &str, expression: &Expr) -> Result<Quantity, Fault> {
-        let known = self.axes.iter().copied().find(|quantity| quantity.name() == name);
-        known.ok_or_else(|| {
-            let known: Vec<&str> = self.axes.iter().map(|quantity| quantity.name()).collect();
-            Fault::unknown(position(expression), "axis", name, &known)
-        })
-    }
-
-    /// The label with this name: an axis of its factor, its number among the labels, and the label.
-    fn label(&self, name: &str) -> Option<(Quantity, usize, &Label)> {
-        let points = self.points?;
-        let place = points.labels.iter().position(|label| label.name == name)?;
-        Some((points.axes.first()?.quantity, place, &points.labels[place]))
+    /// The values of an axis or a label, and its words; an axis of numbers has none.
+    fn variable(&self, name: &Ident, expression: &Expr) -> Result<(Op, Vec<&str>), Fault> {
+        if let Some(points) = self.points
+            && let Some(label) = points.labels.iter().position(|label| label.name == name.value)
+            && let Some(axis) = points.axes.first()
+        {
+            let words = points.labels[label].words.iter().map(String::as_str).collect();
+            return Ok((Op::Label { label, axis: axis.quantity }, words));
+        }
+        match self.axes.iter().find(|quantity| quantity.name() == name.value) {
+            Some(quantity) => Ok((Op::Axis(*quantity), quantity.words())),
+            None => {
+                let known: Vec<&str> = self.axes.iter().map(|quantity| quantity.name()).collect();
+                Err(Fault::unknown(position(expression), "axis", &name.value, &known))
+            }
+        }
     }
 
     fn operand(&mut self, expression: &Expr, wanted: Kind) -> Result<(), Fault> {
@@ -336,29 +292,9 @@ impl Compiler<'_> {
         Err(Fault::new(position(expression), format!("`{expression}` is {is}"), expected, help))
     }
 
-    /// The fault of a comparison of `axis` with an unquoted word `other`.
-    fn unquoted(&self, axis: &Expr, other: &Expr) -> Option<Fault> {
-        let (Expr::Identifier(axis), Expr::Identifier(word)) = (axis, other) else { return None };
-        let quantity = self.axes.iter().find(|quantity| quantity.name() == axis.value)?;
-        let words = quantity.words();
-        let is_axis = word.quote_style.is_none() && self.axes.iter().any(|quantity| quantity.name() == word.value);
-        if words.is_empty() || is_axis {
-            return None;
-        }
-        let meant = nearest(&word.value, words.iter().copied()).unwrap_or(words[0]);
-        let known: Vec<String> = words.iter().map(|word| format!("'{word}'")).collect();
-        let help = format!("text goes in single quotes: `{} = '{meant}'`", quantity.name());
-        Some(Fault::new(position(other), format!("`{other}` is not a word"), known.join(", "), help))
-    }
-
     /// The equality of two numbers, or of an axis of words or a label with a word.
     fn equal(&mut self, left: &Expr, right: &Expr) -> Result<(), Fault> {
-        for (axis, other) in [(left, right), (right, left)] {
-            if let Some(fault) = self.unquoted(axis, other) {
-                return Err(fault);
-            }
-        }
-        let (axis, word, place) = match (word(left), word(right)) {
+        let (variable, word, place) = match (word(left), word(right)) {
             (None, Some(word)) => (left, word, right),
             (Some(word), None) => (right, word, left),
             _ => {
@@ -368,63 +304,56 @@ impl Compiler<'_> {
                 return Ok(());
             }
         };
-        let Expr::Identifier(name) = axis else { return Err(foreign(place)) };
-        if let Some((axis, number, label)) = self.label(&name.value) {
-            let Some(code) = label.words.iter().position(|known| known == word) else {
-                let found = format!("no point has the {name} '{word}'");
-                let meant = nearest(word, label.words.iter().map(String::as_str));
-                let help = meant.map_or("correct the word".to_owned(), |meant| format!("did you mean `{meant}`?"));
-                return Err(Fault::new(position(place), found, format!("a word of the column `{name}`"), help));
-            };
-            let label = Op::Label { label: number, axis };
-            self.program.extend([label, Op::Number(code as f64), Op::Binary(Binary::Equal)]);
-            return Ok(());
+        let Expr::Identifier(name) = variable else { return Err(foreign(place)) };
+        let (variable, words) = self.variable(name, variable)?;
+        if words.is_empty() {
+            let found = format!("'{word}' is a word, `{name}` a number");
+            return Err(Fault::new(position(place), found, "a number", "remove the quotes"));
         }
-        let quantity = self.axis(&name.value, axis)?;
-        let words = quantity.words();
-        let Some(number) = words.iter().position(|known| *known == word) else {
-            if words.is_empty() {
-                let found = format!("'{word}' is a word, `{}` a number", quantity.name());
-                return Err(Fault::new(position(place), found, "a number", "remove the quotes"));
-            }
-            return Err(Fault::unknown(position(place), quantity.name(), word, &words));
+        let Some(code) = words.iter().position(|known| *known == word) else {
+            return Err(Fault::unknown(position(place), &name.value, word, &words));
         };
-        self.program.extend([Op::Axis(quantity), Op::Number(number as f64), Op::Binary(Binary::Equal)]);
+        self.program.extend([variable, Op::Number(code as f64), Op::Binary(Binary::Equal)]);
         Ok(())
     }
 
     fn binary(&mut self, whole: &Expr, left: &Expr, op: &BinaryOperator, right: &Expr) -> Result<Kind, Fault> {
-        let (function, operands, kind) = match op {
-            BinaryOperator::Plus => (Binary::Add, Kind::Number, Kind::Number),
-            BinaryOperator::Minus => (Binary::Subtract, Kind::Number, Kind::Number),
-            BinaryOperator::Multiply => (Binary::Multiply, Kind::Number, Kind::Number),
-            BinaryOperator::Divide => (Binary::Divide, Kind::Number, Kind::Number),
+        let function = match op {
+            BinaryOperator::Plus => Binary::Add,
+            BinaryOperator::Minus => Binary::Subtract,
+            BinaryOperator::Multiply => Binary::Multiply,
+            BinaryOperator::Divide => Binary::Divide,
             BinaryOperator::PGExp => {
                 if matches!(left, Expr::BinaryOp { op: BinaryOperator::PGExp, .. }) {
                     let found = format!("`{whole}` can be read in two ways");
                     return Err(Fault::new(position(whole), found, "one power", "add parentheses, as in `(2^3)^2`"));
                 }
-                (Binary::Power, Kind::Number, Kind::Number)
+                Binary::Power
             }
-            BinaryOperator::Lt => (Binary::Less, Kind::Number, Kind::Truth),
-            BinaryOperator::LtEq => (Binary::LessEqual, Kind::Number, Kind::Truth),
-            BinaryOperator::Gt => (Binary::Greater, Kind::Number, Kind::Truth),
-            BinaryOperator::GtEq => (Binary::GreaterEqual, Kind::Number, Kind::Truth),
+            BinaryOperator::Lt => Binary::Less,
+            BinaryOperator::LtEq => Binary::LessEqual,
+            BinaryOperator::Gt => Binary::Greater,
+            BinaryOperator::GtEq => Binary::GreaterEqual,
             BinaryOperator::Eq | BinaryOperator::NotEq => {
                 self.equal(left, right)?;
                 self.program.extend((*op == BinaryOperator::NotEq).then_some(Op::Unary(Unary::Not)));
                 return Ok(Kind::Truth);
             }
-            BinaryOperator::And => (Binary::And, Kind::Truth, Kind::Truth),
-            BinaryOperator::Or => (Binary::Or, Kind::Truth, Kind::Truth),
+            BinaryOperator::And => Binary::And,
+            BinaryOperator::Or => Binary::Or,
             _ => {
                 let help = match op {
                     BinaryOperator::PGOverlap => "write `and`",
                     BinaryOperator::StringConcat => "write `or`",
                     _ => REMOVE,
                 };
-                return Err(Fault::new(self.operator(left, op), format!("unexpected `{op}`"), GRAMMAR, help));
+                return Err(Fault::new(None, format!("unexpected `{op}`"), GRAMMAR, help));
             }
+        };
+        let (operands, kind) = match function {
+            Binary::And | Binary::Or => (Kind::Truth, Kind::Truth),
+            Binary::Less | Binary::LessEqual | Binary::Greater | Binary::GreaterEqual => (Kind::Number, Kind::Truth),
+            _ => (Kind::Number, Kind::Number),
         };
         self.operand(left, operands)?;
         self.operand(right, operands)?;
@@ -432,35 +361,23 @@ impl Compiler<'_> {
         Ok(kind)
     }
 
-    /// The position of the operator after `left`.
-    fn operator(&self, left: &Expr, op: &BinaryOperator) -> Option<u64> {
-        // A span excludes parentheses.
-        let end = left.span().end.column.saturating_sub(1);
-        let rest: String = self.line.chars().skip(end as usize).collect();
-        let place = rest.find(&op.to_string())?;
-        Some(end + rest[..place].chars().count() as u64 + 1)
-    }
-
     fn call(&mut self, name: &str, arguments: &[&Expr], whole: &Expr) -> Result<Kind, Fault> {
-        let wrong = |count: &str| {
-            let found = format!("`{name}` of {} numbers", arguments.len());
-            Fault::new(position(whole), found, format!("`{name}` of {count}"), "correct the arguments")
+        let Some((_, function)) = FUNCTIONS.iter().find(|(known, _)| *known == name) else {
+            return Err(Fault::unknown(position(whole), "function", name, &FUNCTIONS.map(|(name, _)| name)));
         };
-        if let Some((_, function)) = UNARY.iter().find(|(known, _)| *known == name) {
-            let [argument] = arguments else { return Err(wrong("one number")) };
+        let (counts, expected) = match function {
+            Op::Unary(_) => (1..=1, "one number"),
+            Op::Binary(Binary::Power) => (2..=2, "two numbers"),
+            _ => (2..=usize::MAX, "two numbers or more"),
+        };
+        if !counts.contains(&arguments.len()) {
+            let (found, expected) =
+                (format!("`{name}` of {} numbers", arguments.len()), format!("`{name}` of {expected}"));
+            return Err(Fault::new(position(whole), found, expected, "correct the arguments"));
+        }
+        for (place, argument) in arguments.iter().enumerate() {
             self.operand(argument, Kind::Number)?;
-            self.program.push(Op::Unary(*function));
-        } else if let Some((_, function)) = BINARY.iter().find(|(known, _)| *known == name) {
-            if arguments.len() < 2 || (*function == Binary::Power && arguments.len() > 2) {
-                return Err(wrong(if *function == Binary::Power { "two numbers" } else { "two numbers or more" }));
-            }
-            for (place, argument) in arguments.iter().enumerate() {
-                self.operand(argument, Kind::Number)?;
-                self.program.extend((place > 0).then_some(Op::Binary(*function)));
-            }
-        } else {
-            let known = UNARY.iter().map(|(name, _)| *name).chain(BINARY.iter().map(|(name, _)| *name));
-            return Err(Fault::unknown(position(whole), "function", name, &known.collect::<Vec<_>>()));
+            self.program.extend((place > 0 || arguments.len() == 1).then_some(*function));
         }
         Ok(Kind::Number)
     }
@@ -487,10 +404,7 @@ const REMOVE: &str = "remove it, or use the listed elements";
 
 /// The fault of SQL syntax that is not supported here.
 fn foreign(expression: &Expr) -> Fault {
-    let help = match expression {
-        _ if word(expression).is_some() => "compare an axis of words with it, as in `family = 'step'`",
-        Expr::Identifier(_) => "names have no quotes; text goes in single quotes, as in `family = 'step'`",
-        _ => REMOVE,
-    };
+    let is_word = word(expression).is_some();
+    let help = if is_word { "compare an axis of words with it, as in `family = 'step'`" } else { REMOVE };
     Fault::new(position(expression), format!("unexpected `{expression}`"), GRAMMAR, help)
 }
