@@ -94,7 +94,8 @@ impl TraceFile {
         let pulses = fact("chatter_pulses")
             .and_then(|count| count.parse::<f64>().ok())
             .map_or(String::new(), |count| format!(", chattering shown as {count} pulses"));
-        let name = label::literal(&format!("{protocol}{}{}{pulses}", after("law"), after("loop")));
+        let name = format!("{protocol}{}{}{pulses}", after("law"), after("loop"));
+        let name = label::literal(&name.replace('_', " "));
         let points = fact("points").and_then(|points| points.parse().ok());
         TraceFile { name, parameters: parameters.collect(), columns, points }
     }

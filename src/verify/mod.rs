@@ -130,11 +130,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             let CheckedRow { differences, unchecked, .. } = CheckedRow::new(&row, context, check);
             audit.add(number, &row, differences, unchecked);
         }
-        if missing > 0 {
-            audit.unchecked.insert("their part is missing; `slipsweep run` computes it", missing);
-        }
-        audit.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
-        audits.push(audit);
+        audits.push(audit.finished(missing));
     }
     if audits.iter().all(|audit| audit.rows == 0 && audit.fault.is_none() && !audit.unchecked.is_empty()) {
         return Err(VerifyError(
@@ -155,6 +151,15 @@ fn relative(folder: &Folder, table: &ManifestTable) -> [bool; 2] {
 }
 
 impl Audit {
+    /// The audit of a table of which so many rows of the sample are missing.
+    fn finished(mut self, missing: u64) -> Audit {
+        if missing > 0 {
+            self.unchecked.insert("their part is missing; `slipsweep run` computes it", missing);
+        }
+        self.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
+        self
+    }
+
     fn add(&mut self, number: u64, row: &Row, differences: Vec<Difference>, unchecked: Vec<&'static str>) {
         for reason in unchecked {
             *self.unchecked.entry(reason).or_default() += 1;

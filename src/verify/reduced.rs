@@ -40,9 +40,7 @@ pub fn check(written: &mut CheckedRow<'_>, table: &Table, units: &Units, spec: &
     let middle = |part: u64| ((2 * part + 1) as f64 / (2 * CHECKED_SHORTCUTS) as f64 * all as f64) as u64;
     let solved: Vec<u64> = (0..CHECKED_SHORTCUTS).map(middle).collect();
     let mut buffer = ColumnBuffer::new(columns.len());
-    let (mut statuses, mut gaps) = ([0_u64; Status::ALL.len()], Vec::new());
-    // Row and cells of the first shortcut of least gap.
-    let mut least: Option<(u64, Vec<f64>)> = None;
+    let mut reduction = Reduction::default();
     for start in (0..all).step_by(SHORTCUTS_AT_ONCE) {
         let rows = start..all.min(start + SHORTCUTS_AT_ONCE as u64);
         buffer.resize((rows.end - rows.start) as usize);
@@ -53,14 +51,7 @@ pub fn check(written: &mut CheckedRow<'_>, table: &Table, units: &Units, spec: &
         for (row, place) in rows.zip(0..) {
             let status = buffer.status[place];
             let cells = || buffer.columns.iter().map(|column| column[place]).collect::<Vec<f64>>();
-            statuses[status as usize] += 1;
-            if status == Status::Ok {
-                let found = buffer.columns[gap][place];
-                gaps.push(found);
-                if least.as_ref().is_none_or(|(_, least)| found < least[gap]) {
-                    least = Some((row, cells()));
-                }
-            }
+            reduction.add(row, status, gap, cells);
             if solved.contains(&row) {
                 let mut member = member(&sweep, row, &columns, &cells(), status);
                 scale(&mut member, request.table, units, relative);
@@ -68,45 +59,73 @@ pub fn check(written: &mut CheckedRow<'_>, table: &Table, units: &Units, spec: &
             }
         }
     }
-    let order = [
-        Status::NotConverged,
-        Status::Ok,
-        Status::Unproven,
-        Status::NegativeFriction,
-        Status::BelowBound,
-        Status::Infeasible,
-    ];
-    let status = order.into_iter().find(|status| statuses[*status as usize] > 0);
+    let status = reduction.status();
     written.compare_word(STATUS, status.map_or("", Status::name));
-    if status == Some(Status::NotConverged) {
-        return Ok(());
+    if status != Some(Status::NotConverged) {
+        let point = reduction.least.as_ref().map(|(row, _)| request.row_index.point(*row));
+        reduction.compare(written, table, &columns, point.map(|point| COEFFICIENTS.map(|alpha| point[alpha])));
     }
-    let point = least.as_ref().map(|(row, _)| request.row_index.point(*row));
-    let mut classes = (0..=HISTOGRAM_EDGES.len()).map(|class| {
-        let low = class.checked_sub(1).map_or(f64::NEG_INFINITY, |class| HISTOGRAM_EDGES[class]);
-        (low, HISTOGRAM_EDGES.get(class).copied().unwrap_or(f64::INFINITY))
-    });
-    for column in table.columns().iter().map(|column| column.name) {
-        let place = columns.iter().position(|known| *known == column);
-        match (column, percentage(column)) {
-            ("shortcuts", _) => written.compare_relative(column, gaps.len() as f64, 1.0),
-            ("alpha_2" | "alpha_3", _) => {
-                let alpha = COEFFICIENTS[usize::from(column == "alpha_3")];
-                written.compare_relative(column, point.as_ref().map(|point| point[alpha]), 1.0);
-            }
-            (_, Some(percentage)) if table.name() == "gap_quantiles" => {
-                compare_quantile(written, column, percentage, &gaps)
-            }
-            _ if place.is_some() => {
-                written.compare(column, place.and_then(|place| least.as_ref().map(|(_, cells)| cells[place])));
-            }
-            _ => {
-                let inside = |(low, high): (f64, f64)| gaps.iter().filter(|gap| **gap >= low && **gap < high).count();
-                written.compare_relative(column, classes.next().map(|class| inside(class) as f64), 1.0);
+    Ok(())
+}
+
+/// The shortcuts of a landscape, reduced.
+#[derive(Default)]
+struct Reduction {
+    /// Shortcuts by status.
+    statuses: [u64; Status::ALL.len()],
+    /// The gaps of those that are `ok`.
+    gaps: Vec<f64>,
+    /// Row and cells of the first of least gap.
+    least: Option<(u64, Vec<f64>)>,
+}
+
+impl Reduction {
+    /// Adds a shortcut, whose gap is cell number `gap`.
+    fn add(&mut self, row: u64, status: Status, gap: usize, cells: impl Fn() -> Vec<f64>) {
+        self.statuses[status as usize] += 1;
+        if status == Status::Ok {
+            let cells = cells();
+            self.gaps.push(cells[gap]);
+            if self.least.as_ref().is_none_or(|(_, least)| cells[gap] < least[gap]) {
+                self.least = Some((row, cells));
             }
         }
     }
-    Ok(())
+
+    /// The status of the row: the first of these that a shortcut has.
+    fn status(&self) -> Option<Status> {
+        use Status::{BelowBound, Infeasible, NegativeFriction, NotConverged, Ok, Unproven};
+        let order = [NotConverged, Ok, Unproven, NegativeFriction, BelowBound, Infeasible];
+        order.into_iter().find(|status| self.statuses[*status as usize] > 0)
+    }
+
+    /// Compares the columns of the row. `columns` are those of the cells; the shortcut of least gap has the `coefficients`.
+    fn compare(&self, written: &mut CheckedRow<'_>, table: &Table, columns: &[&str], coefficients: Option<[f64; 2]>) {
+        let Reduction { gaps, least, .. } = self;
+        let mut classes = (0..=HISTOGRAM_EDGES.len()).map(|class| {
+            let low = class.checked_sub(1).map_or(f64::NEG_INFINITY, |class| HISTOGRAM_EDGES[class]);
+            (low, HISTOGRAM_EDGES.get(class).copied().unwrap_or(f64::INFINITY))
+        });
+        for column in table.columns().iter().map(|column| column.name) {
+            let place = columns.iter().position(|known| *known == column);
+            match (column, percentage(column)) {
+                ("shortcuts", _) => written.compare_relative(column, gaps.len() as f64, 1.0),
+                ("alpha_2", _) => written.compare_relative(column, coefficients.map(|[alpha_2, _]| alpha_2), 1.0),
+                ("alpha_3", _) => written.compare_relative(column, coefficients.map(|[_, alpha_3]| alpha_3), 1.0),
+                (_, Some(percentage)) if table.name() == "gap_quantiles" => {
+                    compare_quantile(written, column, percentage, gaps)
+                }
+                _ if place.is_some() => {
+                    written.compare(column, place.and_then(|place| least.as_ref().map(|(_, cells)| cells[place])));
+                }
+                _ => {
+                    let inside =
+                        |(low, high): (f64, f64)| gaps.iter().filter(|gap| **gap >= low && **gap < high).count();
+                    written.compare_relative(column, classes.next().map(|class| inside(class) as f64), 1.0);
+                }
+            }
+        }
+    }
 }
 
 /// The percentage of a column of quantiles.

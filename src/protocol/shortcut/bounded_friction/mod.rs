@@ -135,6 +135,27 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     if spare <= 0.0 {
         return Err(if accelerates { Obstacle::Friction } else { Obstacle::Velocity });
     }
+    let order = paths(by_theta, case, spare, log_ratio);
+    // Rounding of the time, at the greater velocity.
+    let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
+    let rounds = [(LOW_NOISE.max(rtol), MAX_ERROR_GROWTH), (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY)];
+    for (max_noise, max_growth) in rounds {
+        for path in &order {
+            let found =
+                search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), (rtol, max_noise), stats));
+            if let Some(found) = found {
+                return Ok(found);
+            }
+        }
+    }
+    Err(Obstacle::NotConverged)
+}
+
+/// The paths of `case` for each residual and direction, in the order in which they are tried. `spare` is the time beyond that of `v = 0` or of
+/// `tau = tau_M`, `log_ratio` that of the velocities.
+fn paths(by_theta: FrictionPath, case: &Case, spare: f64, log_ratio: f64) -> Vec<FrictionPath> {
+    let Transition { law, v_i, v_f } = case.transition;
+    let (t_f, accelerates) = (case.t_f, v_f > v_i);
     let residual = if accelerates { Residual::TimeLoss } else { Residual::Slip };
     let by_time = by_theta.with_residual(residual, spare);
     let is_close = spare < SPARE_TIME_FRACTION * by_time.time_per_w(0.0).min(t_f);
@@ -151,19 +172,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     if stands_still {
         order.sort_by_key(|path| path.residual != Residual::TwoSidedSlip);
     }
-    // Rounding of the time, at the greater velocity.
-    let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
-    let rounds = [(LOW_NOISE.max(rtol), MAX_ERROR_GROWTH), (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY)];
-    for (max_noise, max_growth) in rounds {
-        for path in &order {
-            let found =
-                search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), (rtol, max_noise), stats));
-            if let Some(found) = found {
-                return Ok(found);
-            }
-        }
-    }
-    Err(Obstacle::NotConverged)
+    order
 }
 
 /// Relative change of some velocity in the last step, at most. Chosen; the budgets of `shortcut` judge it.
