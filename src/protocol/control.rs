@@ -197,7 +197,7 @@ mod tests {
     use super::{Tolerance, ValueRange};
 
     #[test]
-    fn an_extremum_beside_a_node_of_vanishing_slope_is_found() {
+    fn an_extremum_near_a_node_of_vanishing_slope_is_found() {
         // A rise to 1 whose last part overshoots: 1 + d s^2 - s^3 (1 + s) at the distance s from the end, as v_c of a stiff spring.
         for d in [1e-1, 1e-2, 1e-3] {
             let at = |u: f64| {
