@@ -4,6 +4,7 @@
 //! to raise it. Comments and unit tests do not enter it.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::{env, fs, io};
 
 use sha2::{Digest, Sha256};
@@ -37,6 +38,7 @@ const CRATES: [&str; 7] = ["libm", "nalgebra", "parquet", "rand_pcg", "sobol_bur
 const DIGITS: usize = 12;
 
 fn main() -> io::Result<()> {
+    shrink();
     let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     let mut hash = Sha256::new();
     for source in SOURCES {
@@ -78,4 +80,27 @@ fn add(hash: &mut Sha256, root: &Path, source: &Path) -> io::Result<()> {
         hash.update("\n");
     }
     Ok(())
+}
+
+/// Makes the program smaller: the linker merges equal functions, of which unoptimised generic code has many, and packs relocations. Not every
+/// linker and C library can do that, so a small program is linked in this way and run first.
+fn shrink() {
+    const OPTIONS: [&str; 2] = ["-Wl,--icf=all", "-Wl,-z,pack-relative-relocs"];
+    let (Some(rustc), Some(out)) = (env::var_os("RUSTC"), env::var_os("OUT_DIR")) else { return };
+    let [source, linked] = ["linked.rs", "linked"].map(|name| Path::new(&out).join(name));
+    let is_native = env::var_os("TARGET") == env::var_os("HOST");
+    let is_release = env::var("PROFILE").is_ok_and(|profile| profile == "release");
+    if !(is_native && is_release && fs::write(&source, "fn main() {}").is_ok()) {
+        return;
+    }
+    let flags = env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
+    let flags = flags.split('\u{1f}').filter(|flag| !flag.is_empty()).map(str::to_owned);
+    let linker = env::var("RUSTC_LINKER").map(|linker| format!("-Clinker={linker}"));
+    let options = OPTIONS.map(|option| format!("-Clink-arg={option}"));
+    let mut compiler = Command::new(rustc);
+    compiler.args(flags).args(linker).args(options).arg("-o").arg(&linked).arg(&source);
+    let succeeds = |command: &mut Command| command.output().is_ok_and(|done| done.status.success());
+    if succeeds(&mut compiler) && succeeds(&mut Command::new(&linked)) {
+        OPTIONS.iter().for_each(|option| println!("cargo::rustc-link-arg-bins={option}"));
+    }
 }
