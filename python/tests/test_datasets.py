@@ -137,7 +137,7 @@ WRONG = {
     "value": ({"axes": {**PAPER, "v_i": 0.5}}, "axes.v_i: 0.5 is out of range"),
     "table": ({"tables": {"optimum": {}}}, "tables.optimum: unknown table `optimum`"),
     "key": ({"table_s": {}}, "table_s: unknown key `table_s`"),
-    "type": ({"axes": {**PAPER, "v_i": True}}, "axes.v_i: found boolean `true`"),
+    "type": ({"axes": {**PAPER, "v_i": True}}, "axes.v_i: found true"),
 }
 
 
