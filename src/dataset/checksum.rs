@@ -85,7 +85,7 @@ fn head(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<String> {
         let (start, length) = chunk.byte_range();
         let data = u64::try_from(chunk.data_page_offset()).map_err(|_| damaged("list of columns"))?;
         let dictionary = chunk.dictionary_page_offset().map(|_| start..data);
-        for page in dictionary.into_iter().chain([data..start.saturating_add(length)]) {
+        for page in dictionary.into_iter().chain(Some(data..start.saturating_add(length))) {
             hash.update(page_header(file, page)?);
         }
     }
