@@ -7,6 +7,7 @@ use console::Term;
 #[cfg(feature = "query")]
 use super::query::unreadable;
 use super::{Failure, kind, no_table, note, note_rebuilt, say, summary, whole, words};
+use crate::protocol::Status;
 #[cfg(feature = "query")]
 use crate::query::{Source, Tables};
 use crate::table;
@@ -147,6 +148,12 @@ fn hide_middle(lines: &mut [Vec<String>], width: usize) -> usize {
 }
 
 impl Head {
+    /// Whether all rows that are shown are infeasible. The status is the last column.
+    fn is_infeasible(&self) -> bool {
+        let mut words = self.lines.iter().skip(2).filter_map(|line| line.last()).peekable();
+        words.peek().is_some() && words.all(|word| word == Status::Infeasible.name())
+    }
+
     /// A line on the table, then names, units and rows, which a terminal shows in `width` characters.
     fn text(mut self, arguments: &Arguments, width: Option<usize>) -> String {
         let mut text = self.name.clone();
@@ -158,12 +165,17 @@ impl Head {
             }
         }
         text.push('\n');
+        let is_infeasible = self.is_infeasible();
         let hidden = width.map_or(0, |width| hide_middle(&mut self.lines, width.saturating_sub(2)));
         text.push_str(&words::aligned(&self.lines, 2));
         let (path, name) = (arguments.dataset.display(), &self.name);
         if hidden > 0 {
             let columns = words::things(hidden as u64, "more column");
             text.push_str(&format!("  {columns}: slipsweep head {path} {name} | less -S\n"));
+        }
+        if is_infeasible {
+            let (sql, rows) = (format!("SELECT * FROM {name} WHERE status = 'ok'"), arguments.rows);
+            text.push_str(&format!("  rows with numbers, if any: slipsweep query {path} \"{sql} LIMIT {rows}\"\n"));
         }
         text
     }

@@ -17,7 +17,7 @@ impl Spec {
     /// The syntax error, an unknown or missing key, or a value of the wrong type.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
         let document = DeTable::parse(text).map_err(|error| {
-            let help = "put text in \"quotes\", close brackets, separate values by commas, and write each key once";
+            let help = "put text and expressions in \"quotes\", close brackets, write decimals with a point, commas between values, and each key once";
             let fault =
                 SpecError::new("", format!("not TOML: {}", error.message()), "key = value, [table] or # comment", help);
             SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }

@@ -534,6 +534,16 @@ fn regress_answers_are_those_of_standard_sql() {
 }
 
 #[test]
+fn rows_without_numbers_lead_to_rows_with_numbers() {
+    let folder = landscape();
+    let head = printed(folder.path(), &["head", "results/test", "gap", "-n", "3"]);
+    let (_, query) = head.split_once("  rows with numbers, if any: slipsweep query results/test \"").expect("a hint");
+    let answer = printed(folder.path(), &["query", "results/test", query.trim_end().trim_end_matches('"')]);
+    assert_eq!((answer.lines().count(), answer.matches(" ok").count()), (5, 3), "{answer}");
+    assert!(!printed(folder.path(), &["head", "results/test", "optimal"]).contains("rows with numbers"));
+}
+
+#[test]
 fn regress_a_part_in_the_place_of_another_is_refused() {
     let folder = landscape();
     let part = |number: u32| folder.path().join(format!("results/test/gap/part-00000{number}.parquet"));
