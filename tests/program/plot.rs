@@ -582,6 +582,12 @@ fn regress_a_label_as_colour_names_lines() {
     shown(folder, &[&lines[..], &["--color", "material"]].concat());
     let words = words(&plain);
     assert!(read(folder, "lines.svg") == plain && words.contains("granite") && words.contains("quartz"), "{words}");
+    // Also without a column: those that are drawn by default.
+    let all = ["plot", "results/labels", "--table", "optimal", "--out", "all.svg"];
+    shown(folder, &all);
+    let plain = read(folder, "all.svg");
+    shown(folder, &[&all[..], &["--color", "material"]].concat());
+    assert_eq!(read(folder, "all.svg"), plain);
 }
 
 /// A second axis that distinguishes lines is stated after the label; a label common to all lines is in the subtitle.

@@ -48,9 +48,10 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     if !wants_lines && let Some((x, y)) = choice.two_axes(wants_map.is_some())? {
         return choice.map(x, y);
     }
-    if let Some(column) = wants_map {
+    if let Some(column) = wants_map.filter(|column| !filtered.is_label(column)) {
         return Err(choice.no_map(column));
     }
+    let colour = colour.filter(|colour| !filtered.is_label(colour));
     if let Some(y) = y.filter(|y| !filtered.words(y).is_empty()) {
         return Err(PlotError::Words { column: y.to_owned() });
     }
