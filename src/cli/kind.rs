@@ -28,20 +28,15 @@ impl Kind {
     /// The kind of `path`.
     pub fn of(path: &Path) -> Kind {
         let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+        let has_columns_of_trace = || {
+            let columns = columns(path, &ending);
+            ["t", "v"].iter().all(|name| columns.iter().any(|column| column == name))
+        };
         match ending.as_str() {
-            _ if path.is_dir() => {
-                if is_dataset(path) {
-                    Kind::Dataset
-                } else {
-                    Kind::Other
-                }
-            }
+            _ if path.is_dir() && is_dataset(path) => Kind::Dataset,
+            _ if path.is_dir() => Kind::Other,
             "toml" => Kind::Spec,
-            "csv" | "parquet"
-                if ["t", "v"].iter().all(|name| columns(path, &ending).iter().any(|column| column == name)) =>
-            {
-                Kind::Trace
-            }
+            "csv" | "parquet" if has_columns_of_trace() => Kind::Trace,
             _ => Kind::Other,
         }
     }

@@ -10,7 +10,7 @@ use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{waiting, watched};
 use super::{
-    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, parent, say, summary, whole, words, wrong,
+    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, parent, refused, say, summary, whole, words, wrong,
 };
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
@@ -53,6 +53,10 @@ pub struct Arguments {
 /// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
+    if let Some(out) = arguments.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
+        let found = format!("--out {}: not a folder", out.display());
+        return Err(refused(found, "a folder, which the run makes if it is missing", "name a folder"));
+    }
     let (sweep, folder) = subject(arguments)?;
     let (plan, parts) = waiting("planning the sweep", || {
         let plan = Plan::new(&sweep);
