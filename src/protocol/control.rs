@@ -81,7 +81,8 @@ pub(super) enum Tolerance {
 /// A place, with value and slope there.
 type Node = (f64, [f64; 2]);
 
-/// Distance from a node of vanishing slope, in units of a panel, within which a value changes by rounding alone. Derived: the root of half an ulp.
+/// Distance from a node of vanishing slope, in units of a panel, within which a value changes by rounding alone. Derived: the root of the
+/// distance of adjacent doubles at 1.
 const FLAT_LENGTH: f64 = 1.5e-8;
 
 impl ValueRange {
@@ -104,17 +105,10 @@ impl ValueRange {
         let allowed = self.allowed(tolerance);
         let is_divided = matches!(tolerance, Tolerance::OfRange(_)) && (last.1[0] - first.1[0]).abs() > allowed;
         let is_flat = |(_, [_, slope]): Node| is_divided && slope.abs() * (last.0 - first.0) <= allowed;
-        match (is_flat(first), is_flat(last)) {
-            (false, false) => self.add_between(first, last, tolerance, at),
-            (true, false) => self.add_towards(last, first, tolerance, at),
-            (false, true) => self.add_towards(first, last, tolerance, at),
-            (true, true) => {
-                let u = 0.5 * (first.0 + last.0);
-                let middle = (u, at(u));
-                self.add(middle.1[0]);
-                self.add_towards(middle, first, tolerance, at);
-                self.add_towards(middle, last, tolerance, at);
-            }
+        match () {
+            () if is_flat(last) => self.add_towards(first, last, tolerance, at),
+            () if is_flat(first) => self.add_towards(last, first, tolerance, at),
+            () => self.add_between(first, last, tolerance, at),
         }
     }
 

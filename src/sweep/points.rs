@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::fs::{self, File};
+use std::fs::File;
+use std::io;
 use std::path::Path;
 
 use arrow_array::cast::AsArray;
@@ -31,7 +32,7 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let file = check_size(path)?;
     let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {
-        Some("csv") => csv(path, units)?,
+        Some("csv") => csv(path, file, units)?,
         // A panic of the reader on a damaged file is a fault of the file.
         Some("parquet") => {
             guarded(|| parquet(path, file, units)).unwrap_or_else(|| Err(unreadable(path, &"it is damaged")))?
@@ -160,8 +161,8 @@ impl Column {
 }
 
 /// Reads CSV: a header of names, then one line for each point. Skips empty lines and lines that begin with #.
-fn csv(path: &Path, units: &Units) -> Result<Vec<Column>, SpecError> {
-    let text = fs::read_to_string(path).map_err(|error| unreadable(path, &error))?;
+fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError> {
+    let text = io::read_to_string(file).map_err(|error| unreadable(path, &error))?;
     // Spreadsheets write a byte order mark.
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim).zip(1..);
     let mut lines = lines.filter(|(line, _)| !line.is_empty() && !line.starts_with('#'));

@@ -14,7 +14,7 @@ const MOST_NODES: u32 = 4_000_000;
 
 const FINE: f64 = 1e-12;
 
-/// Shortest legal piece.
+/// Least legal `delta_t`.
 const MIN_DURATION: f64 = 1e-20;
 
 /// What rounding may leave of the velocity where the exponent of a piece is steep.
@@ -91,10 +91,13 @@ fn accurate(point: &Point, rough: &Regularised, row: &mut Row) {
     let Some(fine) = found.value else { return row.fact("exists at 1e-12", false) };
     let noise = 2.0 * (rtol + FINE);
     row.agree("work to rtol", rough.work, fine.work, noise);
-    // Rounding of the works of the pieces, whose friction may change sign, of their times, and of the exponents of their velocities.
+    // Rounding of the works of the pieces and of their times; for `a` below the physical domain also of the exponents of steep velocities. Works cancel
+    // where friction changes sign, which grows by `b` times such an exponent.
     let exponent = (fine.v_max / fine.v_min).ln();
-    let friction = 1.0 + slider.law.b * exponent;
-    let rounding = f64::EPSILON * (4.0 + exponent) * (friction + fine.gap.abs() * t_f / delta_t);
+    let units = if slider.law.a < 1e-3 { 4.0 + exponent } else { 4.0 };
+    let is_cancelled = found.status == Status::NegativeFriction;
+    let friction = if is_cancelled { 1.0 + slider.law.b * exponent } else { 1.0 };
+    let rounding = units * f64::EPSILON * (friction + fine.gap.abs() * t_f / delta_t);
     row.at_most("gap to rtol", (rough.gap - fine.gap).abs(), noise * fine.gap.abs() + rounding);
     // The ends of a piece have slopes of the order of 1/a in time, and curvatures of their square.
     let slope = delta_t / slider.law.a;
