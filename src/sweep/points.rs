@@ -175,7 +175,12 @@ fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError>
         check_count(path, count + 1)?;
         let cells = cells_of(&place(number), line)?;
         if cells.len() != columns.len() {
-            let found = format!("{}: {} values for {} columns", place(number), cells.len(), columns.len());
+            let found = format!(
+                "{}: the number of values is {}, that of columns {}",
+                place(number),
+                cells.len(),
+                columns.len()
+            );
             return Err(fault(found, "a value for each column", "correct the line"));
         }
         for (column, cell) in columns.iter_mut().zip(cells) {
@@ -297,9 +302,17 @@ fn header<'a>(place: &str, names: impl Iterator<Item = &'a str>) -> Result<Vec<C
     let mut columns: Vec<Column> = Vec::new();
     for name in names {
         let quantity = Quantity::from_name(name);
-        if columns.iter().any(|other| other.name == name) || name.is_empty() {
-            let found = format!("{place}: column `{name}` without a name, or with that of another column");
-            return Err(fault(found, "each column once, with a name", "rename it, or remove it"));
+        if name.is_empty() {
+            let found = format!("{place}: column {} has no name", columns.len() + 1);
+            return Err(fault(
+                found,
+                "a name for each column",
+                "name it, or remove it; pandas: to_csv(..., index=False)",
+            ));
+        }
+        if columns.iter().any(|other| other.name == name) {
+            let found = format!("{place}: duplicate column `{name}`");
+            return Err(fault(found, "each column once", "rename it, or remove it"));
         }
         if quantity.is_none() && name.contains([';', '\t', '\r']) {
             let found = format!("{place}: columns or lines that end with ; or a tab, in `{name}`");
