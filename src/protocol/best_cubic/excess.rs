@@ -12,7 +12,7 @@
 use crate::model::Transition;
 use crate::numerics::cubic::ExactCubic;
 use crate::numerics::double_double::DoubleDouble;
-use crate::numerics::elementary::{ln, ln_1p};
+use crate::numerics::elementary::{ln, ln_1p, phi};
 use crate::numerics::gauss::rule;
 use crate::protocol::cubic::Path;
 use crate::protocol::{SolverStats, optimal};
@@ -177,21 +177,7 @@ fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
 
 /// `(1 + r) ln(1 + r) - r`, without cancellation near 0.
 fn entropy(r: f64) -> f64 {
-    if r.abs() < 0.1 {
-        // sum_k (-r)^k/(k (k - 1)) from k = 2: sixteen terms leave 1e-17 of the first.
-        let mut power = r * r;
-        let mut sum = 0.0;
-        for k in 2..18 {
-            let k = f64::from(k);
-            sum += power / (k * (k - 1.0));
-            power *= -r;
-        }
-        sum
-    } else if r > -1.0 {
-        (1.0 + r) * ln_1p(r) - r
-    } else {
-        1.0
-    }
+    if r > -1.0 { (1.0 + r) * phi(-ln_1p(r)) } else { 1.0 }
 }
 
 fn panel(density: &mut impl FnMut(f64) -> Option<f64>, from: f64, to: f64) -> Option<f64> {

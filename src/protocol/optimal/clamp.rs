@@ -5,14 +5,14 @@
 
 use std::cell::Cell;
 
-use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
+use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, steady_friction};
 use super::ceiling::{CeilingArc, Ceilings};
 use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use super::{ArcKind, floor};
 use crate::model::Law;
 use crate::numerics::MAX_STEPS;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi, phi_and_slope};
 
 /// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.
 #[derive(Debug, Clone, Copy)]

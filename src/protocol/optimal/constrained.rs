@@ -1,7 +1,7 @@
 //! The optimum under ceilings: the free one where it obeys them, else the clamped extremal of the same family that takes
 //! the given time.
 
-use super::arc::{Sums, phi};
+use super::arc::Sums;
 use super::ceiling::Ceilings;
 use super::clamp::{Path, PathView, Switch, Switches, falling_part};
 use super::extremal::{MAX_LN_U, Problem};
@@ -10,7 +10,7 @@ use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum};
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::turning;
 use crate::protocol::{Solved, SolverStats, Status};

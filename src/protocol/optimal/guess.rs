@@ -2,12 +2,11 @@
 
 use multiversion::multiversion;
 
-use super::arc::phi;
 use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
 use crate::numerics::MAX_LN;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};

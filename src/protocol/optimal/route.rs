@@ -6,7 +6,7 @@ use super::floor;
 use super::motion::{Floor, Timed};
 use crate::model::Law;
 use crate::numerics::MAX_STEPS;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::radau::radau;
 use crate::protocol::control::{Jet, Tolerance, ValueRange};
 
@@ -257,14 +257,7 @@ impl Timed {
 
 /// `int theta v dt` over a time on `v = 1`, from theta on: no difference of times, of which it may be a small part.
 pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
-    // t - 1 + e^-t.
-    let idle = if time < 0.1 {
-        // Each term is less than a thirtieth of the one before.
-        (3..14).rev().fold(1.0, |sum, k| 1.0 - time / f64::from(k) * sum) * 0.5 * time * time
-    } else {
-        time + exp_m1(-time)
-    };
-    idle - theta * exp_m1(-time)
+    phi(-time) - theta * exp_m1(-time)
 }
 
 /// Most landmarks of a floor arc. Chosen: beyond, `e^-100`, nothing changes any more.
