@@ -75,11 +75,8 @@ impl SteadySliding {
         };
         let [(first, frequency), (second, _)] = pair.map(|(re, im)| (re.high, im));
         // Without mass the real one is NaN, which `max` and `min` ignore.
-        let [growth, decay] = if frequency > 0.0 {
-            [first, lone]
-        } else {
-            [first.max(second).max(lone), first.min(second).min(lone)]
-        };
+        let [growth, decay] =
+            if frequency > 0.0 { [first, lone] } else { [first.max(second).max(lone), first.min(second).min(lone)] };
         Some(Eigenvalues {
             // The Routh-Hurwitz determinant has the opposite sign, also where rounding reverses that of a small growth.
             growth_rate: if self.hurwitz == 0.0 { 0.0 } else { (scale * growth).abs().copysign(-self.hurwitz) },
