@@ -59,7 +59,7 @@ impl VelocityStep {
                 intervals.push(MotionInterval::Arrest { t: run.t(), from: *run.y(), to: arrested });
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            intervals.push(MotionInterval::Integrated(step_to(&mut run, end).ok()?));
+            intervals.push(MotionInterval::Integrated(step_to(&mut run, end)?));
             if intervals.len() > MAX_INTERVALS {
                 return None;
             }
