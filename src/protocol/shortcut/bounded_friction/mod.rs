@@ -30,10 +30,10 @@ mod work_and_velocity;
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::{Transition, friction_margin};
-use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln_1p, ln_near_1};
 use crate::numerics::root::{Probe, newton};
 use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
+use crate::protocol::optimal::acceleration_time_at_ceiling;
 use crate::protocol::{Motion, SolverStats};
 use motion::BoundedFrictionMotion;
 use panel::FrictionPanel;
@@ -127,8 +127,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     let accelerates = v_f > v_i;
     let spare = t_f
         - if accelerates {
-            acceleration_time_at_ceiling(law.a, v_i, -log_ratio, (margin_i, margin_f), stats)
-                .ok_or(Obstacle::NotConverged)?
+            acceleration_time_at_ceiling(&case.transition, case.tau_ceiling).ok_or(Obstacle::Friction)?
         } else {
             (v_i - v_f) / v_i * (1.0 / v_f)
         };
@@ -250,27 +249,6 @@ fn refine(
         path = path.with(path.alpha + step);
     }
     None
-}
-
-/// Time of an acceleration with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`, in `l/v_0`; `None` where the quadrature fails.
-///
-/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. Panels are halved towards the end that is nearer to the
-/// pole at `z = 0`.
-fn acceleration_time_at_ceiling(
-    a: f64,
-    v_i: f64,
-    span: f64,
-    (margin_i, margin_f): (f64, f64),
-    stats: &mut SolverStats,
-) -> Option<f64> {
-    let (z_i, z_f) = (margin_i / a, margin_f / a);
-    let rate = |s: f64| {
-        let (fallen, z) = if z_i < z_f { (s, z_i + s * (z_f - z_i)) } else { (1.0 - s, z_f + s * (z_i - z_f)) };
-        Some([span * exp(-fallen * span) / v_i / exp_m1(z)])
-    };
-    let ([time], nodes) = integrals(rate, vec![(0.0, 1.0)], &[0.0])?;
-    *stats += SolverStats { quadratures: 1, nodes };
-    Some(time)
 }
 
 /// Tolerance of the passes of the search. Chosen; the budgets of `shortcut` judge it.
