@@ -174,8 +174,8 @@ impl NodeThresholds {
 /// The zeros of theta and of `1 - theta'` of one shortcut, padded to all lanes with very distant points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Zeros {
-    re: Lanes,
-    im: Lanes,
+    pub re: Lanes,
+    pub im: Lanes,
     /// Real parts minus 1, with all digits of a zero near the end.
     from_end: Lanes,
 }
@@ -188,18 +188,6 @@ pub(super) const THETA_ZEROS: usize = 3;
 
 /// Greatest distance of a zero. Chosen: farther zeros have no effect.
 pub(super) const MAX_ZERO_DISTANCE: f64 = 1e9;
-
-/// Zeros of theta and of `1 - theta'`; cheaper than [`Zeros::of`], but less accurate for a close pair at the start.
-pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
-    let (theta, n) = path.about_end();
-    let mut zeros = rough_zeros(theta, n);
-    for (re, im) in zeros.re.iter_mut().zip(&mut zeros.im).take(THETA_ZEROS) {
-        if is_near_start(*re, *im) {
-            (*re, *im) = polished(&path.about_start().0, *re, *im).unwrap_or((*re, *im));
-        }
-    }
-    zeros
-}
 
 /// The zeros of several shortcuts, from the expansion about the end; zeros near the start are not yet [`polished`].
 #[inline(always)]
