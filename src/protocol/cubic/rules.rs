@@ -120,9 +120,6 @@ pub(super) struct NodeThresholds {
     pub longest: f64,
 }
 
-/// Loosest accuracy of the parts of a cut panel. Measured: at looser accuracies the residues of a close pair exceed [`LN_SAFETY_FACTOR`].
-const MAX_PARTS_TOLERANCE: f64 = 1e-5;
-
 /// The focal sums from which [`NODE_STEP`] nodes suffice for `tolerance`, then twice as many, and so on.
 fn focal_sums(tolerance: f64) -> [f64; MAX_NODES / NODE_STEP] {
     let mut focal = [0.0; MAX_NODES / NODE_STEP];
@@ -150,12 +147,6 @@ impl NodeThresholds {
         let height = 0.5 * (LN_SAFETY_FACTOR - ln(tolerance)) / MAX_UNCUT_NODES as f64;
         let slight = if most <= longest * (0.25 * height * height) { rounding / law.a } else { 0.0 };
         NodeThresholds { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
-    }
-
-    /// The accuracy for the parts of a panel that is cut at a close pair of zeros: at low accuracies the residues of the pair exceed the margin.
-    pub fn of_parts(&self, tolerance: f64) -> NodeThresholds {
-        let tolerance = tolerance.min(MAX_PARTS_TOLERANCE);
-        NodeThresholds { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
     }
 
     /// The focal sum from which `nodes` suffice.
