@@ -10,6 +10,7 @@
 //! Both terms are at least 0, so the sum has full relative precision, however small it is.
 
 use crate::model::Transition;
+use crate::numerics::MAX_PANELS;
 use crate::numerics::cubic::ExactCubic;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{ln, ln_1p, phi};
@@ -25,8 +26,6 @@ const NEGLIGIBLE_ERROR: f64 = 1e-20;
 const NODES: usize = 12;
 /// Greatest number of halvings of a panel, which locate the kinks where the feedback leaves the floor. Chosen: 2^-30 is below the promised error.
 const MAX_BISECTIONS: u32 = 30;
-/// Greatest number of panels. Chosen: smooth cases take two to eight, a kink some thirty.
-const MAX_PANELS: u32 = 1000;
 /// Fraction of the shortcut's velocity below which that of the optimum may underflow. Chosen; the budgets of `best_cubic` judge it.
 const MIN_DENSITY: f64 = 1e-3;
 /// Ratio of the lengths of successive panels towards an end. Chosen: a graded mesh resolves the layer with a few panels.

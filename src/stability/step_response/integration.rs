@@ -8,6 +8,7 @@ use multiversion::multiversion;
 
 use super::scaled_block::{Rates, ScaledBlock, State, X, Y};
 use super::series::{Powers, TERMS, reach};
+use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::stiff::{Accuracy, DenseOutput, Integrator, radau_iia_9};
 
@@ -42,9 +43,6 @@ const MAX_REACH: f64 = 5.0;
 
 /// Change of `ln theta` in a series, at most. Chosen: beyond it terms of `1/theta` below the rounding of the others grow.
 const MAX_CHANGE: f64 = 6.0;
-
-/// Reductions of a series for [`MAX_CHANGE`], at most. Chosen: where the velocity falls, the first one is too small.
-const MAX_CUTS: u32 = 6;
 
 /// Length of a step, in units of the fastest motion, above which steps are implicit. Measured: both kinds cost as much
 /// there (`cargo bench --bench step_response`).
@@ -118,7 +116,7 @@ impl Integration<'_> {
         let mut length = h.min(self.integrator.left(limit));
         let over = |h: f64| DenseOutput::from_powers(self.t(), h, state, stretched(&powers, h / unit));
         let mut step = over(length);
-        for _ in 0..MAX_CUTS {
+        for _ in 0..MAX_STEPS {
             let change = (step.end[Y] - state[Y]).abs();
             if change <= MAX_CHANGE {
                 break;

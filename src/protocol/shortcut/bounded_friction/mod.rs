@@ -174,9 +174,6 @@ fn paths(by_theta: FrictionPath, case: &Case, spare: f64, log_ratio: f64) -> Vec
     order
 }
 
-/// Relative change of some velocity in the last step, at most. Chosen; the budgets of `shortcut` judge it.
-const MAX_LAST_CHANGE: f64 = 1e-3;
-
 /// Tolerance at the nodes of the last pass, in units of `rtol`. Chosen: the rest is left for the other errors of the row.
 const LAST_PASS_FRACTION: f64 = 0.1;
 
@@ -231,7 +228,7 @@ fn refine(
         }
         if is_last && (within(0.5 * rtol) || spent) {
             // Where this residual depends on alpha by rounding only, it fails.
-            return within(MAX_LAST_CHANGE).then_some((path, panels));
+            return within(NEWTON_CHANGE).then_some((path, panels));
         }
         if !step.is_finite() || is_last && are_neighbours {
             return None;
@@ -254,8 +251,9 @@ fn refine(
 /// Tolerance of the passes of the search. Chosen; the budgets of `shortcut` judge it.
 const SEARCH_TOLERANCE: f64 = 1e-4;
 
-/// Relative change of `alpha_3` that ends the search. Chosen: from three digits Newton's method takes two or three passes.
-const SEARCH_RTOL: f64 = 1e-3;
+/// Relative change of `alpha_3` that ends the search, and of some velocity in the last step, at most. Chosen: from three digits Newton's method takes
+/// two or three passes.
+const NEWTON_CHANGE: f64 = 1e-3;
 
 /// Weight of a relative error of 1 of theta at the end, in the step that ends the search. Chosen; the budgets of `shortcut` judge it.
 const RESIDUAL_WEIGHT: f64 = 0.1;
@@ -299,7 +297,7 @@ fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Opti
         }
         // A step that is small compared with alpha may still pass the point where theta falls to 0. Theta may arrive almost
         // independently of alpha: the growth of errors vanishes beyond.
-        let most = if errors > max_growth { 2.0 * SEARCH_RTOL } else { RESIDUAL_WEIGHT * value.abs() / path.size };
+        let most = if errors > max_growth { 2.0 * NEWTON_CHANGE } else { RESIDUAL_WEIGHT * value.abs() / path.size };
         let weight = (1.0 / scale).max(most / step.abs());
         Some(Probe { value: -step * weight, slope: weight })
     };
@@ -309,6 +307,6 @@ fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Opti
         Residual::Slip | Residual::TwoSidedSlip => (far, MAX_ASINH_ALPHA),
         Residual::TimeLoss => (-far, MAX_ASINH_ALPHA),
     };
-    let root = newton(probe, start, (-most, most), false, SEARCH_RTOL)?;
+    let root = newton(probe, start, (-most, most), false, NEWTON_CHANGE)?;
     (!gave_up && errors <= max_growth).then(|| alpha_at(root.x))
 }
