@@ -160,21 +160,25 @@ pub fn substep(run: &mut Integration<'_>, step: &IntegrationStep, from: f64, to:
     }
 }
 
+/// A value of a step of either kind.
+macro_rules! of_step {
+    ($self:ident, $step:ident => $value:expr) => {
+        match $self {
+            IntegrationStep::Implicit($step) => $value,
+            IntegrationStep::Taylor($step) => $value,
+        }
+    };
+}
+
 impl IntegrationStep {
     /// Time at its start.
     pub fn t(&self) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.t,
-            IntegrationStep::Taylor(step) => step.t,
-        }
+        of_step!(self, step => step.t)
     }
 
     /// Duration.
     pub fn h(&self) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.h,
-            IntegrationStep::Taylor(step) => step.h,
-        }
+        of_step!(self, step => step.h)
     }
 
     /// Time at the fraction `u` of the step.
@@ -184,34 +188,22 @@ impl IntegrationStep {
 
     /// State at its start.
     pub fn start(&self) -> &State {
-        match self {
-            IntegrationStep::Implicit(step) => &step.start,
-            IntegrationStep::Taylor(step) => &step.start,
-        }
+        of_step!(self, step => &step.start)
     }
 
     /// State at its end.
     pub fn end(&self) -> &State {
-        match self {
-            IntegrationStep::Implicit(step) => &step.end,
-            IntegrationStep::Taylor(step) => &step.end,
-        }
+        of_step!(self, step => &step.end)
     }
 
     /// Variable `r` at the fraction `u` of the step.
     pub fn value(&self, r: usize, u: f64) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.value(r, u),
-            IntegrationStep::Taylor(step) => step.value(r, u),
-        }
+        of_step!(self, step => step.value(r, u))
     }
 
     /// Time derivative of variable `r` at the fraction `u` of the step.
     pub fn slope(&self, r: usize, u: f64) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.slope(r, u),
-            IntegrationStep::Taylor(step) => step.slope(r, u),
-        }
+        of_step!(self, step => step.slope(r, u))
     }
 }
 
