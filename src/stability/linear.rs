@@ -36,6 +36,9 @@ pub struct Eigenvalues {
     pub decay_rate: Option<f64>,
 }
 
+/// Growth rate in units of the frequency up to which it is `-H/(2 [(M + a)^2 + c M])`. Derived: the next term is less than that fraction of it.
+const MIN_GROWTH: f64 = 1e-14;
+
 impl SteadySliding {
     /// Steady sliding at velocity `v > 0`, on a spring of stiffness `k > 0` (infinite: rigid), of a mass `m >= 0`.
     pub fn new(law: Law, k: f64, m: f64, v: f64) -> SteadySliding {
@@ -77,12 +80,14 @@ impl SteadySliding {
         // Without mass the real one is NaN, which `max` and `min` ignore.
         let [growth, decay] =
             if frequency > 0.0 { [first, lone] } else { [first.max(second).max(lone), first.min(second).min(lone)] };
-        Some(Eigenvalues {
-            // The Routh-Hurwitz determinant has the opposite sign, also where rounding reverses that of a small growth.
-            growth_rate: if self.hurwitz == 0.0 { 0.0 } else { (scale * growth).abs().copysign(-self.hurwitz) },
-            frequency: scale * frequency,
-            decay_rate: has_mass.then_some(scale * decay),
-        })
+        // The sum P of the pair solves M^2 P^3 + 2 M (M + a) P^2 + [(M + a)^2 + c M] P = -H; a small one is below the 32 digits.
+        let growth_rate = if growth.abs() <= MIN_GROWTH * frequency {
+            let slope = sum * sum + c * self.inertia;
+            self.v * (0.0 - self.hurwitz) / (2.0 * slope.high)
+        } else {
+            scale * growth
+        };
+        Some(Eigenvalues { growth_rate, frequency: scale * frequency, decay_rate: has_mass.then_some(scale * decay) })
     }
 }
 
