@@ -6,7 +6,6 @@ use super::extremal::Problem;
 use super::{ArcKind, Bounds, Obstacle, posed};
 use crate::model::Transition;
 use crate::numerics::elementary::{exp, ln};
-use crate::numerics::root::crossing;
 use crate::numerics::{MAX_LN, MIN_INVERTIBLE};
 
 /// The least and the greatest feasible time under the bounds, each in closed form or one quadrature; the greatest is
@@ -147,5 +146,33 @@ fn root(
         low = (low.0 - step, room(low.0 - step));
         step *= 2.0;
     }
-    at(crossing(room, [low.0, high.0], [low.1, high.1], 0.1 * rtol)).0
+    at(zero_of_rising(room, low, high, 0.1 * rtol)).0
+}
+
+/// The zero of a rising function between two places with their values, to `resolution`: the Illinois method (Dowell and
+/// Jarratt, BIT 11, 168, 1971), which ends once values on both sides are that close, with bisections where it lags.
+fn zero_of_rising(f: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64), resolution: f64) -> f64 {
+    let (mut at_low, mut at_high) = (low.1, high.1);
+    for step in 0.. {
+        let width = high.0 - low.0;
+        let secant = (high.0 - at_high * width / (at_high - at_low)).max(low.0).min(high.0);
+        // The side that has not moved is evaluated close to the zero.
+        let x = match step % 3 {
+            2 => low.0 + 0.5 * width,
+            _ if secant - low.0 < resolution => low.0 + 0.5 * resolution,
+            _ if high.0 - secant < resolution => high.0 - 0.5 * resolution,
+            _ => secant,
+        };
+        if width <= resolution || !(x > low.0 && x < high.0) {
+            return secant;
+        }
+        let value = f(x);
+        if value < 0.0 {
+            (low, at_low, at_high) = ((x, value), value, 0.5 * at_high);
+        } else {
+            (high, at_high, at_low) = ((x, value), value, 0.5 * at_low);
+        }
+        (at_low, at_high) = if step % 3 == 2 { (low.1, high.1) } else { (at_low, at_high) };
+    }
+    high.0
 }
