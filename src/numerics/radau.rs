@@ -145,17 +145,16 @@ pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
 fn make() -> Radau {
     let one = DoubleDouble::new(1.0);
     let u = nodes::<NODES>();
-    let Collocation { nodes: places, integration, differentiation, start_slope, .. } = Collocation::make();
-    let columns = |rows: [Nodes; NODES]| std::array::from_fn(|k| rows.map(|row| row[k]));
+    let Collocation { nodes: places, integration, .. } = Collocation::make();
     let w = integration[NODES - 1];
     let mut rule = Radau {
         u: places,
         rest: u.map(|u| (one - u).high),
         w,
-        columns: columns(integration),
+        columns: std::array::from_fn(|k| integration.map(|row| row[k])),
         barycentric: [1.0; NODES + 1],
-        slopes: columns(differentiation),
-        slopes_at_0: start_slope,
+        slopes: [[0.0; NODES]; NODES],
+        slopes_at_0: [0.0; NODES],
         highest: [[0.0; NODES]; 2],
     };
     for k in 0..NODES {
@@ -171,6 +170,17 @@ fn make() -> Radau {
             // The factor keeps the products near 1; it cancels in the formula.
             rule.barycentric[k] /= 4.0 * (places[k] - places[j]);
         }
+    }
+    for j in 0..NODES {
+        // The slope of a constant is 0. This determines the diagonal; the sum includes the node 0.
+        let entry = |k: usize| rule.barycentric[k] / rule.barycentric[j] / (places[j] - places[k]);
+        let others: Vec<f64> = (0..=NODES).map(|k| if k == j { 0.0 } else { entry(k) }).collect();
+        for k in 0..NODES {
+            rule.slopes[k][j] = if k == j { -others.iter().sum::<f64>() } else { others[k] };
+        }
+    }
+    for k in 0..NODES {
+        rule.slopes_at_0[k] = -rule.barycentric[k] / rule.barycentric[NODES] / rule.u[k];
     }
     rule
 }

@@ -37,7 +37,7 @@ pub struct Eigenvalues {
 }
 
 /// Growth rate in units of the frequency up to which it is `-H/(2 [(M + a)^2 + c M])`. Derived: the next term is less than that fraction of it.
-const MIN_GROWTH: f64 = 1e-14;
+const MIN_GROWTH: f64 = 1e-16;
 
 impl SteadySliding {
     /// Steady sliding at velocity `v > 0`, on a spring of stiffness `k > 0` (infinite: rigid), of a mass `m >= 0`.

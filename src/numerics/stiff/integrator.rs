@@ -28,6 +28,10 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     allowed: f64,
     /// The time with 32 digits, so that short steps add up after a long rest.
     t: DoubleDouble,
+    /// Remaining time below the last digit of `t`.
+    rest: f64,
+    /// Shortest step, as a fraction of the time before it.
+    shortest: f64,
     y: [f64; N],
     /// Length proposed for the next step.
     h: f64,
@@ -44,7 +48,8 @@ struct LastStep<const N: usize, const S: usize> {
 /// Least tolerated error, relative to the variables: 32 units in the last place. Chosen: the roundings of a step.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Shortest step, as a fraction of the time before it. Derived: `2^-107`, the rounding of a double-double number.
+/// Shortest step, as a fraction of the time before it, unless it [may be shorter](Integrator::may_step). Derived: `2^-107`, the
+/// rounding of a double-double number.
 const MIN_STEP_FRACTION: f64 = 6e-33;
 
 /// Newton iterations before a step is rejected. Chosen: at the rate of 0.1 they give twelve digits.
@@ -70,7 +75,13 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         // The estimate is of order S, the error of order 2 S - 1.
         let fraction = (S + 1) as f64 / (2 * S) as f64;
         let allowed = exp(fraction * ln(accuracy.tolerance));
-        Integrator { system, rule, accuracy, allowed, t: DoubleDouble::new(t), y, h, last: None }
+        let (t, shortest) = (DoubleDouble::new(t), MIN_STEP_FRACTION);
+        Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest, y, h, last: None }
+    }
+
+    /// Allows steps down to this fraction of the time before them. A solution that becomes infinite then takes more steps to detect.
+    pub fn may_step(&mut self, fraction: f64) {
+        self.shortest = fraction;
     }
 
     /// Time reached.
@@ -101,12 +112,20 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// Continues from the variables `y` at a time later by `h`, found by other means, with a first step of about `next > 0`. Returns whether `h`
     /// is long enough to be represented.
     pub fn leap(&mut self, h: f64, y: [f64; N], next: f64) -> bool {
-        let advances = h > MIN_STEP_FRACTION * self.t.high;
+        let advances = h > self.shortest * self.t.high;
         if advances {
-            self.t = self.t + DoubleDouble::new(h);
+            self.pass(h);
             (self.y, self.h, self.last) = (y, next, None);
         }
         advances
+    }
+
+    /// Advances the time.
+    #[inline(always)]
+    fn pass(&mut self, h: f64) {
+        let t = self.t + DoubleDouble::new(self.rest + h);
+        self.rest = if t == self.t { self.rest + h } else { 0.0 };
+        self.t = t;
     }
 
     /// Takes one step, which ends at `limit` at the latest, and then exactly there. `None` if no step is short enough: the solution ends here,
@@ -117,7 +136,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             let left = self.left(limit);
             let cut = self.h >= left;
             let h = if cut { left } else { self.h };
-            let advances = h > MIN_STEP_FRACTION * self.t.high;
+            let advances = h > self.shortest * self.t.high;
             if !advances {
                 return None;
             }
@@ -137,7 +156,11 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             let next = h * factor.clamp(0.2, 8.0);
             self.h = if cut { next.max(self.h) } else { next };
             let dense_output = DenseOutput::new(self.rule, self.t.high, h, self.y, &change);
-            self.t = if cut { DoubleDouble::new(limit) } else { self.t + DoubleDouble::new(h) };
+            if cut {
+                (self.t, self.rest) = (DoubleDouble::new(limit), 0.0);
+            } else {
+                self.pass(h);
+            }
             self.y = dense_output.end;
             self.last = Some(LastStep { dense_output, error });
             return Some(dense_output);

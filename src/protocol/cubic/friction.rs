@@ -124,7 +124,8 @@ impl Path<'_> {
     /// Friction where it may be least or greatest, places found with less work first.
     fn frictions(&self, law: Law) -> impl Iterator<Item = f64> {
         let stationary = move |end: f64| self.stationary(law, end).into_iter().map(move |d| (end - d).abs());
-        let places = [0.0, 1.0, self.theta.minimum(), self.n.minimum()].into_iter();
+        // The middle, at which both halves end, is stationary on symmetric paths.
+        let places = [0.0, 1.0, 0.5, self.theta.minimum(), self.n.minimum()].into_iter();
         places.chain([0.0, 1.0].into_iter().flat_map(stationary)).map(move |x| {
             let (theta, n) = self.at(x);
             if n > 0.0 && theta > 0.0 {

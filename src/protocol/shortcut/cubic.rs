@@ -34,7 +34,9 @@ fn solve(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Ob
     };
     if v_i != v_f {
         let point = landscape.point(place, Friction::Log, rtol, stats).ok_or(Obstacle::Velocity)?;
-        (member.work, member.v_min, member.v_max) = (point.work, point.v_min, point.v_max);
+        // The landscape rounds the velocities of the ends.
+        (member.work, member.v_min) = (point.work, point.v_min.min(v_i).min(v_f));
+        member.v_max = point.v_max.max(v_i).max(v_f);
     }
     Ok(member)
 }

@@ -52,6 +52,10 @@ const IMPLICIT_FROM: f64 = 15.0;
 /// [`IMPLICIT_FROM`], so that the kinds do not alternate.
 const SERIES_BELOW: f64 = 10.0;
 
+/// Duration of a slip of a light block on a soft spring, fraction of the rest before it, at least. Chosen: far below those
+/// of the physical domain.
+const SHORTEST_SLIP: f64 = 1e-120;
+
 /// Error of an implicit step, fraction of the tolerance. Chosen: an error of theta in a stick phase becomes an error of the
 /// time of the next slip, and accuracy costs least there.
 const IMPLICIT_ERROR: f64 = 0.03;
@@ -61,7 +65,10 @@ impl ScaledBlock {
     pub fn run(&self, state: State, h: f64, tolerance: f64) -> Integration<'_> {
         let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
         let implicit = Accuracy { tolerance: IMPLICIT_ERROR * tolerance, ..accuracy };
-        let integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
+        let mut integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
+        if self.inertia > 0.0 || self.k > self.b - self.a {
+            integrator.may_step(SHORTEST_SLIP);
+        }
         // Near rest a series is this short: rounding errors of the force enter its terms over factorials.
         let order = TERMS as f64;
         let rounding = exp((ln(tolerance / f64::EPSILON) + libm::lgamma(order + 1.0)) / order);
