@@ -159,6 +159,7 @@ struct State {
 
 /// Reads `theta=0.3,t_left=0.015`.
 fn state(text: &str) -> Result<State, String> {
+    let text: String = text.split_whitespace().collect();
     let parts = text.strip_prefix("theta=").and_then(|rest| rest.split_once(",t_left="));
     let (theta, t_left) = parts.ok_or("expected theta=THETA,t_left=TIME")?;
     let [theta, t_left] = [(theta, Quantity::Theta), (t_left, Quantity::TimeLeft)]

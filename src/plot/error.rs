@@ -93,6 +93,12 @@ pub enum PlotError {
          help: --y {line} draws lines{}", if *.are_words { "; `slipsweep query` lists the words" } else { "" }
     )]
     NoMap { table: String, column: String, found: String, line: String, are_words: bool },
+    /// Lines in the colours of a result.
+    #[error(
+        "--color {column} is a result, which colours maps\n  expected: an axis or a label, since --y draws lines{}\n  help: remove --color",
+        if among.is_empty() { String::new() } else { format!(": {among}") }
+    )]
+    ColourOfLines { column: String, among: String },
     /// Traces in different units.
     #[error(
         "the traces differ in the unit of `{column}`\n  found: {} and {}\n  expected: the same units\n  help: draw them one by one, or \

@@ -49,6 +49,11 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
         return choice.map(x, y);
     }
     if let Some(column) = wants_map.filter(|column| !filtered.is_label(column)) {
+        if y.is_some() {
+            let axes = choice.varying.iter().map(|axis| axis.name.as_str());
+            let among: Vec<&str> = axes.filter(|axis| Some(*axis) != x).chain(filtered.label_columns()).collect();
+            return Err(PlotError::ColourOfLines { column: column.to_owned(), among: among.join(", ") });
+        }
         return Err(choice.no_map(column));
     }
     let colour = colour.filter(|colour| !filtered.is_label(colour));

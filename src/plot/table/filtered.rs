@@ -256,13 +256,24 @@ impl FilteredTable {
         Ok(frame::read_where(part, names, &may_hold).map_err(ReadError::from)?)
     }
 
-    /// The label of a row in markup, from the cells of the columns of labels.
+    /// The label of a row in markup, from the cells of the columns of labels; for empty cells, as in `no material`.
     pub fn label(&self, cells: &[f64]) -> String {
         let word = |((_, words), cell): (&(String, Vec<String>), &f64)| {
             let word = words.get(*cell as usize).filter(|_| !cell.is_nan())?;
             Some(label::literal(word))
         };
-        self.labels.iter().zip(cells).filter_map(word).collect::<Vec<_>>().join(", ")
+        let words: Vec<String> = self.labels.iter().zip(cells).filter_map(word).collect();
+        match self.labels.first() {
+            Some((name, _)) if words.is_empty() => format!("no {}", label::literal(name)),
+            _ => words.join(", "),
+        }
+    }
+
+    /// Drops all labels but `name`, if it is one that varies.
+    pub fn keep_label(&mut self, name: &str) {
+        if self.labels.iter().any(|(label, _)| label == name) {
+            self.labels.retain(|(label, _)| label == name);
+        }
     }
 
     /// The names of the labels that vary.

@@ -258,6 +258,9 @@ impl Source {
             "gap_quantiles" if is_default => reduced::quantiles(&filtered)?,
             _ => {
                 let shape = choice::choose(&filtered, picture, request)?;
+                if let (Shape::Lines(_), Some(label)) = (&shape, &request.colour) {
+                    filtered.keep_label(label);
+                }
                 let drawn = match &shape {
                     Shape::Map(plan) => vec![plan.x.clone(), plan.y.clone()],
                     Shape::Lines(plan) => vec![plan.x.clone()],
