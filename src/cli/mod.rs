@@ -172,7 +172,7 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
 /// Runs the command of the arguments of a process, the first of which is its name. Returns the exit code.
 pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool) -> u8 {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
-    report_first_panic();
+    hide_guarded_panics();
     // Without this signal, a file that exceeds the user's limit fails to write instead of ending the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
@@ -326,12 +326,11 @@ fn note(text: impl Display) {
     let _ = writeln!(io::stderr(), "note: {text}");
 }
 
-/// Reports only the first panic of the process: the engine provokes others while it searches for the faulty row. Panics of a reader of damaged
-/// files are reported as errors of the file.
-fn report_first_panic() {
-    let (usual, known) = (panic::take_hook(), AtomicBool::new(false));
+/// Prints no message for panics of a reader of damaged files, which become errors of the file.
+fn hide_guarded_panics() {
+    let usual = panic::take_hook();
     panic::set_hook(Box::new(move |panic| {
-        if !crate::dataset::is_guarded() && !known.swap(true, Ordering::Relaxed) {
+        if !crate::dataset::is_guarded() {
             usual(panic);
         }
     }));
