@@ -39,13 +39,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::{Parser, Subcommand};
 
 use self::watch::waiting;
-use crate::dataset::{Folder, Manifest, atomic};
+use crate::dataset::{Folder, MANIFEST, Manifest, atomic};
+use crate::file::folder_of;
 use crate::names::hint;
 #[cfg(feature = "query")]
 use crate::query::QueryError;
 use crate::sweep::{SpecError, Sweep, schema};
 
-use kind::{Kind, MANIFEST};
+use kind::Kind;
 
 /// Exit code if the spec or the arguments are wrong.
 const EXIT_REQUEST: u8 = 1;
@@ -202,15 +203,10 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))
 }
 
-/// The folder of a path; of a bare name, the current one.
-fn parent(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Refuses to replace a part or the manifest of a dataset.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = fs::canonicalize(parent(&real)).unwrap_or_else(|_| parent(&real).to_owned());
+    let folder = fs::canonicalize(folder_of(&real)).unwrap_or_else(|_| folder_of(&real).to_owned());
     let is_manifest = real.file_name().is_some_and(|name| name == MANIFEST) && kind::is_dataset(&folder);
     if is_manifest || folder.parent().is_some_and(kind::is_dataset) {
         let what = "a file of a dataset, which only `slipsweep run` writes";
@@ -314,10 +310,9 @@ pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
 /// Prints a note if the manifest of the dataset in `path` was reconstructed from the parts.
 fn note_rebuilt(path: &Path) {
     let Ok(Some(Manifest { rebuilt: Some(why), .. })) = Folder::at(path).manifest() else { return };
-    let manifest = path.join(MANIFEST);
     note(format!(
         "{} is {why}; rebuilt from the footers of the parts; `slipsweep run` rewrites it",
-        manifest.display()
+        Folder::at(path).manifest_path().display()
     ));
 }
 

@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::shards::{quoted, scripts};
-use super::{EXIT_FAILURE, Failure, kind, parent, refused, say, summary, words};
+use super::{EXIT_FAILURE, Failure, kind, refused, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey, TableSurvey};
+use crate::file::folder_of;
 use crate::sweep::{Plan, Sweep, shards_with};
 
 /// Arguments of `status`.
@@ -140,11 +141,11 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
         let _ = writeln!(text, "  run its spec with {theirs}; this is {ours}, whose parts would differ");
         return text;
     }
-    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).ok();
+    let sweep = Sweep::parse_at(&manifest.spec, &Folder::at(path).manifest_path()).ok();
     let plan = sweep.as_ref().map(Plan::new);
     let is_same = plan.as_ref().is_some_and(|plan| plan.tables == manifest.tables);
     let (Some(sweep), Some(plan), true) = (sweep, plan, is_same) else {
-        let out = quoted(parent(path));
+        let out = quoted(folder_of(path));
         let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
         text.push_str("SPEC is the spec file of this dataset: it refers to files that are not in the dataset\n");
         return text;

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant, SystemTime};
 use tempfile::NamedTempFile;
 
 use super::folder::{DatasetError, failed};
+use crate::file::folder_of;
 
 /// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Chosen: writing one takes seconds, and a day covers wrong clocks.
 const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
@@ -54,11 +55,6 @@ fn filled<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Resul
     fill(temporary.as_file_mut())?;
     temporary.as_file().sync_all()?;
     Ok(temporary)
-}
-
-/// The folder of a file.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Creates a temporary file for `path` in its folder, which is removed unless it is renamed. Its name holds the machine; its lock shows

@@ -12,6 +12,9 @@ use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, State};
 use crate::file;
 
+/// The name of the file of the manifest.
+pub const MANIFEST: &str = "manifest.json";
+
 /// The help if the folder contains another dataset.
 const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
@@ -119,7 +122,7 @@ impl Folder {
 
     /// The path of the manifest.
     pub fn manifest_path(&self) -> PathBuf {
-        self.path.join("manifest.json")
+        self.path.join(MANIFEST)
     }
 
     /// The manifest, if any; reconstructed from the parts if its file is missing or damaged.

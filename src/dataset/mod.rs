@@ -25,7 +25,7 @@ mod survey;
 
 pub use batch::batch;
 pub use cell::Cell;
-pub use folder::{DatasetError, Folder};
+pub use folder::{DatasetError, Folder, MANIFEST};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
 pub use frame::{FrameError, ReadError, Row};
