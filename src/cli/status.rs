@@ -93,18 +93,15 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
     });
     let shown = |paths: &[PathBuf]| -> Vec<String> { paths.iter().map(|path| path.display().to_string()).collect() };
     let file = |table: &TableSurvey, part: u64| folder.part(&table.name, part).display().to_string();
-    let damaged = tables()
-        .flat_map(|table| table.damaged.iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))));
-    let foreign = tables().flat_map(|table| {
-        table.foreign.iter().map(move |(part, [what, expected, found])| {
-            let file = file(table, *part);
-            format!("{file}: belongs to another {what}\n    expected: {expected}\n    found: {found}")
-        })
-    });
+    let files = |of: fn(&TableSurvey) -> &[(u64, String)]| -> Vec<String> {
+        tables()
+            .flat_map(|table| of(table).iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))))
+            .collect()
+    };
     let lists: [(&str, Vec<String>); 5] = [
         ("missing parts:", missing.collect()),
-        ("damaged parts (the next run recomputes them):", damaged.collect()),
-        ("foreign files in the place of parts (a run leaves them alone and fails):", foreign.collect()),
+        ("damaged parts (the next run recomputes them):", files(|table| &table.damaged)),
+        ("foreign files in the place of parts (a run leaves them alone and fails):", files(|table| &table.foreign)),
         (
             "temporary files of running or killed processes (the next run removes those of killed ones):",
             shown(&survey.temporary),

@@ -57,10 +57,10 @@ pub enum DatasetError {
     Occupied { folder: String },
     /// A file with the name of a part does not belong to this sweep.
     #[error(
-        "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away; `slipsweep run` then \
-         computes the part and keeps all others"
+        "{path}: not a part of this dataset: {why}\n  help: move the file away; `slipsweep run` then computes the part and keeps all \
+         others"
     )]
-    ForeignPart { path: String, what: &'static str, expected: String, found: String },
+    ForeignPart { path: String, why: String },
     /// A part is damaged.
     #[error(
         "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
@@ -247,7 +247,7 @@ impl Folder {
     pub fn fault(&self, path: &Path, state: State) -> DatasetError {
         let (path, dataset) = (path.display().to_string(), self.path.display().to_string());
         match state {
-            State::Foreign { what, expected, found } => DatasetError::ForeignPart { path, what, expected, found },
+            State::Foreign { why } => DatasetError::ForeignPart { path, why },
             State::Damaged { why } => DatasetError::DamagedPart { path, why, dataset },
             State::Missing | State::There { .. } => {
                 DatasetError::DamagedPart { path, why: "it changed while it was read".to_owned(), dataset }
