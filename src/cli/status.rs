@@ -51,13 +51,9 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
         text.push_str(if arguments.check { "complete; all checksums match\n" } else { "complete\n" });
         return say(&text);
     }
-    let runs = folder.runs();
-    for run in &runs {
-        let what = if run.is_alone { "a run" } else { "a run of a shard" };
-        let _ = writeln!(text, "{what} is writing this dataset (process {})", run.process);
-    }
-    if !runs.iter().any(|run| run.is_alone) {
-        text.push_str(&remedy(path, &manifest, &survey));
+    match folder.is_busy() {
+        true => text.push_str("a run is writing this dataset\n"),
+        false => text.push_str(&remedy(path, &manifest, &survey)),
     }
     say(&text)?;
     let (all, there) =

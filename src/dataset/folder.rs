@@ -40,10 +40,10 @@ pub enum DatasetError {
     OtherTables { folder: String, expected: String, found: String },
     /// Another run writes the dataset.
     #[error(
-        "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
+        "{folder}: another run is writing this dataset\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
          shards (--shard I/N) run side by side"
     )]
-    Busy { folder: String, process: String },
+    Busy { folder: String },
     /// The dataset was changed during this run.
     #[error(
         "{folder}: {what} during this run, which stopped\n  help: run the same command again; it keeps finished parts"

@@ -38,7 +38,7 @@ pub use layout::Layout;
 pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
-pub use session::{Concurrency, Holder, Session};
+pub use session::{Concurrency, Session};
 pub(crate) use state::OTHER_SWEEP;
 pub use state::{CheckDepth, State};
 pub use statistics::{Counts, MAX_KEPT_ROWS, Row as StatisticsRow, TableStatistics};
