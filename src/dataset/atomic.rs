@@ -217,18 +217,4 @@ mod tests {
             assert_eq!(lost, 0);
         });
     }
-
-    #[test]
-    fn a_new_file_replaces_no_other() {
-        let folder = tempfile::tempdir().expect("is writable");
-        let path = folder.path().join("x");
-        assert!(write_new(&path, b"first").expect("is writable"));
-        assert!(!write_new(&path, b"second").expect("is writable"));
-        assert_eq!(fs::read(&path).expect("is readable"), b"first");
-        write(&path, b"third").expect("is writable");
-        assert_eq!(
-            (fs::read(&path).expect("is readable"), names(folder.path())),
-            (b"third".to_vec(), vec!["x".to_owned()])
-        );
-    }
 }
