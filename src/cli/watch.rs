@@ -43,7 +43,7 @@ pub fn watched<T>(signal: &Signal, tables: Vec<(u64, u64)>, quiet: bool, work: i
 /// Runs `work`, which writes nothing, and shows what it is `doing` on a terminal after a second. Ctrl-C and SIGTERM end the process with a message
 /// that nothing has changed. Waits must not be nested.
 pub fn waiting<T>(doing: &str, work: impl FnOnce() -> T) -> T {
-    let line = bar(false, "{msg} ({elapsed})").with_message(doing.to_owned());
+    let line = bar(false, 0, "{msg} ({elapsed})").with_message(doing.to_owned());
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
             line.finish_and_clear();
@@ -121,9 +121,9 @@ fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
 }
 
 /// A progress line, which appears only on a terminal and unless `quiet`.
-fn bar(quiet: bool, template: &str) -> ProgressBar {
+fn bar(quiet: bool, length: u64, template: &str) -> ProgressBar {
     let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
-    ProgressBar::with_draw_target(Some(0), target).with_style(style(template))
+    ProgressBar::with_draw_target(Some(length), target).with_style(style(template))
 }
 
 fn style(template: &str) -> ProgressStyle {
@@ -150,8 +150,8 @@ struct ProgressDisplay {
 impl ProgressDisplay {
     fn new(tables: Vec<(u64, u64)>, quiet: bool) -> ProgressDisplay {
         let rows = tables.iter().fold(0_u64, |sum, (rows, _)| sum.saturating_add(*rows));
-        let now = Instant::now();
-        ProgressDisplay { tables, rows, quiet, bar: bar(quiet, "{msg}"), last: now, phase: Phase::Checking, since: now }
+        let (now, bar) = (Instant::now(), bar(quiet, cost(&tables, rows), "{msg}"));
+        ProgressDisplay { tables, rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
     }
 
     fn update(&mut self, signal: &Signal) {
@@ -163,36 +163,23 @@ impl ProgressDisplay {
         if is_new {
             self.bar.set_style(style(if is_computing { "{bar:20} {percent}% of {msg}" } else { "{msg}" }));
         }
-        if is_new && is_computing {
-            self.bar.set_length(self.cost(self.rows));
-            self.bar.set_position(self.cost(kept));
-            self.bar.reset_eta();
+        let text = self.text(signal);
+        if is_computing || self.since.elapsed() > PROGRESS_DELAY {
+            if self.bar.is_hidden() && !self.quiet && self.last.elapsed() >= LINE_INTERVAL {
+                self.last = Instant::now();
+                let done = if is_computing { format!("{} of ", words::count(kept + done)) } else { String::new() };
+                // A progress line that cannot be written is no failure.
+                let _ = writeln!(stderr(), "{done}{text}");
+            }
+            self.bar.set_message(text);
         }
         if is_computing {
-            self.bar.set_position(self.cost(kept + done));
+            self.bar.set_position(cost(&self.tables, kept + done));
         }
-        let text = self.text(signal);
-        if !is_computing && self.since.elapsed() <= PROGRESS_DELAY {
-            return;
+        if is_new && is_computing {
+            // Kept rows take no time.
+            self.bar.reset_eta();
         }
-        if !self.bar.is_hidden() {
-            self.bar.set_message(text);
-        } else if !self.quiet && self.last.elapsed() >= LINE_INTERVAL {
-            self.last = Instant::now();
-            let done = if is_computing { format!("{} of ", words::count(kept + done)) } else { String::new() };
-            // A progress line that cannot be written is no failure.
-            let _ = writeln!(stderr(), "{done}{text}");
-        }
-    }
-
-    /// The cost of the first `rows` rows.
-    fn cost(&self, mut rows: u64) -> u64 {
-        let costs = self.tables.iter().map(|&(all, cost)| {
-            let first = rows.min(all);
-            rows -= first;
-            first as f64 * cost as f64
-        });
-        costs.sum::<f64>() as u64
     }
 
     fn text(&self, signal: &Signal) -> String {
@@ -213,4 +200,14 @@ impl ProgressDisplay {
             Phase::Writing => "writing the last parts".to_owned(),
         }
     }
+}
+
+/// The cost of the first `rows` rows of tables with these numbers of rows and mean costs.
+fn cost(tables: &[(u64, u64)], mut rows: u64) -> u64 {
+    let costs = tables.iter().map(|&(all, cost)| {
+        let first = rows.min(all);
+        rows -= first;
+        first as f64 * cost as f64
+    });
+    costs.sum::<f64>() as u64
 }
