@@ -1,4 +1,4 @@
-//! Opens plain files that a user names. Named pipes, which wait for a writer, and devices, which may never end, are refused.
+//! Plain files that a user names. Named pipes, which wait for a writer, and devices, which may never end, are refused.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -16,6 +16,11 @@ pub fn open(path: &Path) -> io::Result<File> {
     }
     let found = if kind.is_dir() { "a folder, not a file" } else { "a device or a named pipe, not a file" };
     Err(io::Error::new(io::ErrorKind::InvalidInput, found))
+}
+
+/// The folder of a path; of a bare name, the current one.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The bytes of the file in `path`.

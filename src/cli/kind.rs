@@ -4,12 +4,9 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::{Failure, refused};
-use crate::dataset::{Folder, frame};
+use crate::dataset::{Folder, MANIFEST, frame};
 use crate::file;
 use crate::sweep::path_hint;
-
-/// The file that makes a folder a dataset.
-pub const MANIFEST: &str = "manifest.json";
 
 /// The kind of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -20,10 +20,11 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
 use super::{
-    Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, parent, say, stdout, summary, to_file, words,
-    written, wrong,
+    Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, say, stdout, summary, to_file, words, written,
+    wrong,
 };
-use crate::dataset::atomic;
+use crate::dataset::{Folder, atomic};
+use crate::file::folder_of;
 use crate::query::{self, Answer, AnswerError, Comparisons, Tables};
 #[cfg(target_os = "linux")]
 use crate::sweep::available_bytes;
@@ -183,7 +184,7 @@ fn reason(status: ExitStatus, said: &str) -> String {
 /// Removes the temporary files that an ended process left for `out`.
 fn sweep(out: &Path) {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    atomic::sweep(parent(&real), SystemTime::now());
+    atomic::sweep(folder_of(&real), SystemTime::now());
 }
 
 /// Answers a query in this process, which ends after its answer, or when the process that started it ends.
@@ -284,7 +285,7 @@ fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failur
 /// The failure for tables that cannot be read to the end, usually because of a damaged file.
 pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     let path = dataset.display();
-    let help = if dataset.join("manifest.json").exists() {
+    let help = if Folder::at(dataset).manifest_path().exists() {
         format!("`slipsweep status {path} --check` names damaged files, and the next run recomputes them")
     } else {
         "write the file again".to_owned()

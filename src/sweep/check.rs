@@ -72,8 +72,7 @@ pub fn path_hint(path: &Path, ending: &str) -> String {
     if ending.is_empty() && dataset.is_dir() {
         return format!("did you mean `{}`?", dataset.display());
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let entries = fs::read_dir(file::folder_of(path)).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort();
     let name = if ending.is_empty() { path.file_name() } else { path.file_stem() };

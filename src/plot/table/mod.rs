@@ -250,7 +250,7 @@ impl Source {
             let conditions = [request.conditions.clone(), Condition::all(&format!("{hidden}=inf"))?].concat();
             filtered = FilteredTable::new(&self.folder, &self.manifest, table, &conditions)?;
         }
-        let no_table = || PlotError::NoTable { name: table.to_owned(), found: self.tables() };
+        let no_table = || PlotError::unknown("the dataset has no table", table, &self.tables());
         let picture = TABLE_PICTURES.iter().find(|picture| picture.table == table).ok_or_else(no_table)?;
         let is_default = request.x.is_none() && request.y.is_none() && request.colour.is_none();
         let (mut figure, drawn) = match table {
