@@ -36,12 +36,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use self::watch::waiting;
 use crate::dataset::{Folder, MANIFEST, Manifest, atomic};
 use crate::file::folder_of;
-use crate::names::hint;
+use crate::names::{hint, nearest};
 #[cfg(feature = "query")]
 use crate::query::QueryError;
 use crate::sweep::{SpecError, Sweep, schema};
@@ -177,9 +178,11 @@ pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool
     // Without this signal, a file that exceeds the user's limit fails to write instead of ending the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let words: Vec<OsString> = arguments.collect();
+    let arguments = match Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => {
+            let error = suggested(error, &words);
             let printed = error.print();
             if error.use_stderr() {
                 // A lost terminal is ignored.
@@ -189,6 +192,27 @@ pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool
         }
     };
     ended(perform(arguments))
+}
+
+/// The error of an unknown option among `words` with the option that was probably meant.
+fn suggested(mut error: clap::Error, words: &[OsString]) -> clap::Error {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return error };
+    if error.kind() != ErrorKind::UnknownArgument {
+        return error;
+    }
+    let plain = |option: &str| option.trim_start_matches('-').replace('-', "");
+    let given = plain(given);
+    let program = Arguments::command();
+    let command = words.iter().skip(1).find_map(|word| program.find_subcommand(word)).unwrap_or(&program);
+    let options: Vec<&str> = command.get_arguments().filter_map(clap::Arg::get_long).collect();
+    let spelt: Vec<String> = options.iter().map(|option| plain(option)).collect();
+    let meant = nearest(&given, spelt.iter().map(String::as_str));
+    error.remove(ContextKind::SuggestedArg);
+    error.remove(ContextKind::Suggested);
+    if let Some(place) = spelt.iter().position(|option| Some(option.as_str()) == meant) {
+        error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{}", options[place])));
+    }
+    error
 }
 
 /// Writes a file completely or not at all, unless it belongs to a dataset.

@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::kind::Kind;
 use super::shards::{quoted, scripts};
-use super::{EXIT_FAILURE, Failure, kind, refused, say, summary, words};
+use super::{EXIT_FAILURE, Failure, kind, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey, TableSurvey};
 use crate::file::folder_of;
 use crate::sweep::{Plan, Sweep, shards_with};
@@ -32,11 +33,12 @@ const MAX_LISTED: usize = 10;
 /// A path that is not a dataset, or damaged parts.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
-    kind::expect_rows(path)?;
+    if !path.is_dir() {
+        return Err(kind::unexpected(path, &[Kind::Dataset]));
+    }
     let folder = Folder::at(path);
     let Some(manifest) = folder.manifest().map_err(Failure::failed)? else {
-        let (found, help) = (format!("{}: not a dataset", path.display()), "name a folder that `slipsweep run` wrote");
-        return Err(refused(found, "a folder with a manifest.json or at least one part", help));
+        return Err(kind::unexpected(path, &[Kind::Dataset]));
     };
     let survey =
         summary::survey(&folder, &manifest, if arguments.check { CheckDepth::Whole } else { CheckDepth::Footer });

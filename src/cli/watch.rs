@@ -20,7 +20,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Time after which a terminal shows the progress. Chosen: a user should not wait longer than a second without a message.
-const PROGRESS_DELAY: Duration = Duration::from_secs(1);
+pub const PROGRESS_DELAY: Duration = Duration::from_secs(1);
 
 /// Runs `work`. Meanwhile it shows the progress through `tables`, the rows of each and their mean cost, unless `quiet`, and passes Ctrl-C and SIGTERM
 /// on to `signal`.
@@ -43,7 +43,7 @@ pub fn watched<T>(signal: &Signal, tables: Vec<(u64, u64)>, quiet: bool, work: i
 /// Runs `work`, which writes nothing, and shows what it is `doing` on a terminal after a second. Ctrl-C and SIGTERM end the process with a message
 /// that nothing has changed. Waits must not be nested.
 pub fn waiting<T>(doing: &str, work: impl FnOnce() -> T) -> T {
-    let line = bar(false, 0, "{msg} ({elapsed})").with_message(doing.to_owned());
+    let line = spinner(doing);
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
             line.finish_and_clear();
@@ -118,6 +118,11 @@ fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
     signal_hook::flag::register(number, again)?;
     signal_hook::flag::register_usize(number, signals.caught.clone(), number as usize)?;
     Ok(())
+}
+
+/// A line that states what a command is `doing`, on a terminal and once it ticks.
+pub fn spinner(doing: &str) -> ProgressBar {
+    bar(false, 0, "{msg} ({elapsed})").with_message(doing.to_owned())
 }
 
 /// A progress line, which appears only on a terminal and unless `quiet`.

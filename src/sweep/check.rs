@@ -90,9 +90,8 @@ impl Sweep {
     ///
     /// The faults of the file or spec, with their lines.
     pub fn load(path: &Path) -> Result<Sweep, SpecError> {
-        let mut text = String::new();
-        let read = file::open(path).and_then(|file| file.take(MAX_SPEC_BYTES + 1).read_to_string(&mut text));
-        read.map_err(|error| {
+        let text = file::open(path).and_then(|file| file::text(file.take(MAX_SPEC_BYTES + 1)));
+        let text = text.map_err(|error| {
             let help = match error.kind() {
                 io::ErrorKind::NotFound => path_hint(path, ".toml"),
                 io::ErrorKind::InvalidData => "save it as UTF-8 in the editor".to_owned(),

@@ -164,9 +164,9 @@ impl Column {
 
 /// Reads CSV: a header of names, then one line for each point. Skips lines without values and lines that begin with #.
 fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError> {
-    let text = io::read_to_string(file).map_err(|error| match error.kind() {
+    let text = file::text(file).map_err(|error| match error.kind() {
         io::ErrorKind::InvalidData => {
-            fault(format!("{}: not UTF-8", path.display()), "a CSV file in UTF-8", "save it as \"CSV UTF-8\"")
+            fault(format!("{}: {error}", path.display()), "a CSV file in UTF-8", "save it as \"CSV UTF-8\"")
         }
         _ => unreadable(path, &error),
     })?;

@@ -704,5 +704,5 @@ fn regress_files_of_points_that_are_not_quite_csv() {
         assert!(csv(content).starts_with("cases.csv:1: columns or lines that end with ; or a tab"));
     }
     assert_eq!(csv(b",t_f,a\n0,1,2\n"), "cases.csv:1: column 1 has no name");
-    assert_eq!(csv(b"\xff\xfet\0_\0f\0"), "cases.csv: stream did not contain valid UTF-8");
+    assert_eq!(csv(b"\xff\xfet\0_\0f\0"), "cases.csv: line 1 is not UTF-8");
 }

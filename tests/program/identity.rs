@@ -180,7 +180,7 @@ fn other_points_in_the_same_file_are_another_spec() {
     let reported = refusal(&Sweep::load(&path).expect("is legal"), folder.path());
     assert!(
         reported
-            .contains("\n  in the spec: the files that it names\n  in the dataset: other contents of the same files\n"),
+            .contains("\n  in the spec: the file of points (line 2)\n  in the dataset: other contents of this file\n"),
         "{reported}"
     );
 }
