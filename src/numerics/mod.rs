@@ -20,7 +20,7 @@ pub mod wright;
 /// Steps of an iteration, at most. Chosen: a bisection down to the rounding of its bracket takes 53.
 pub const MAX_STEPS: u32 = 200;
 
-/// Panels of a quadrature, at most. Chosen: 0.1 s; the hardest cases take some hundreds.
+/// Panels of a quadrature or other parts of a whole, at most. Chosen: 0.1 s; the hardest cases take some hundreds.
 pub const MAX_PANELS: u32 = 10_000;
 
 /// Relative difference that counts as rounding. Chosen: that of a few operations.

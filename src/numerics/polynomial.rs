@@ -1,6 +1,6 @@
 //! All real roots of a polynomial on an interval, each bracketed between roots of its derivative.
 
-use super::MAX_STEPS;
+use super::root::{LAST_STEP_RESIDUAL, Probe, newton};
 
 /// The value of `c[0] + c[1] x + c[2] x^2 + …` at `x`, and its slope.
 pub fn value_and_slope(c: &[f64], x: f64) -> (f64, f64) {
@@ -19,26 +19,17 @@ pub fn roots_between(c: &[f64], low: f64, high: f64) -> Vec<f64> {
     ends.windows(2).filter_map(|piece| root_of_monotone(c, piece[0], piece[1])).collect()
 }
 
-/// Newton's method inside a bracket. A step that leaves the bracket is replaced by a bisection.
-fn root_of_monotone(c: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
+/// The sign change of a polynomial without extrema in `(low, high)`; `None` if there is none.
+fn root_of_monotone(c: &[f64], low: f64, high: f64) -> Option<f64> {
     let (first, last) = (value_and_slope(c, low).0, value_and_slope(c, high).0);
-    if !((first < 0.0 && last > 0.0) || (first > 0.0 && last < 0.0)) {
+    let rises = last.signum();
+    let probe = |x: f64| {
+        let (value, slope) = value_and_slope(c, x);
+        Some(Probe { value: rises * value, slope: rises * slope })
+    };
+    if first * rises >= 0.0 || last == 0.0 {
         return None;
     }
-    let mut x = 0.5 * (low + high);
-    for _ in 0..MAX_STEPS {
-        let (value, slope) = value_and_slope(c, x);
-        if (value < 0.0) == (first < 0.0) {
-            low = x;
-        } else {
-            high = x;
-        }
-        let newton = x - value / slope;
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - x).abs() <= f64::EPSILON * x.abs() {
-            return Some(next);
-        }
-        x = next;
-    }
-    Some(x)
+    let enough = LAST_STEP_RESIDUAL * first.abs().min(last.abs());
+    newton(probe, 0.5 * (low + high), (low, high), true, enough).map(|root| root.x)
 }

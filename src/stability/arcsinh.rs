@@ -5,6 +5,7 @@
 use super::linear;
 use crate::model::Law;
 use crate::model::arcsinh::{LOG_LEVEL, reduction, steady_level};
+use crate::numerics::MAX_PANELS;
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
 
@@ -33,7 +34,7 @@ pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
     };
     let step = STEP / (1.0 + gain);
     let mut high = highest;
-    for _ in 0..MAX_STEPS {
+    for _ in 0..MAX_PANELS {
         // At lower velocities f is 1.
         if steady_level(&law, -high) > LOG_LEVEL {
             return linear::critical_velocity(law, k, m);
@@ -49,6 +50,3 @@ pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
 
 /// Steps of the search in `ln v`, over the scale `a/(b - a)` on which `f` falls, or 1. Chosen: finer than the bend of `f`.
 const STEP: f64 = 0.05;
-
-/// Steps, at most. Chosen: over 200 scales.
-const MAX_STEPS: u32 = 4000;

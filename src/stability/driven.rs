@@ -160,7 +160,7 @@ impl<'a> Driven<'a> {
         let mut run = Integrator::new(self, radau_iia_9(), accuracy, from, state, h);
         while run.t() < to {
             *budget = budget.checked_sub(1)?;
-            run.step(to).ok()?;
+            run.step(to)?;
         }
         Some((*run.y(), run.proposal()))
     }

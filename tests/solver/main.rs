@@ -27,7 +27,9 @@ mod relaxed;
 mod shortcut_edges;
 mod shortcut_friction;
 mod shortcut_velocity;
+mod stability;
 mod step_response;
+mod stiff;
 mod stress;
 #[path = "../support/mod.rs"]
 mod support;

@@ -237,8 +237,12 @@ fn reference_motions_carry_the_numbers_of_their_member() {
         assert_eq!((landmarks[0], landmarks[landmarks.len() - 1]), (0.0, 1.0));
         assert!(landmarks.windows(2).all(|pair| pair[0] < pair[1]));
         let (mut v_min, mut v_max, mut friction_max, mut t) = (f64::INFINITY, 0.0f64, f64::NEG_INFINITY, 0.0);
-        for i in 0..=20_000 {
-            let moment = motion.at(f64::from(i) / 20_000.0);
+        let between = |pair: &[f64]| {
+            let (from, to) = (pair[0], pair[1]);
+            (0..=1000).map(move |i| from + (to - from) * f64::from(i) / 1000.0)
+        };
+        for s in landmarks.windows(2).flat_map(between) {
+            let moment = motion.at(s);
             assert!(moment.t >= t, "{family} {case:?}: time falls at {moment:?}");
             let friction = 1.0 + PAPER.a * moment.v.ln() + PAPER.b * moment.theta.ln();
             assert!((moment.friction - friction).abs() < 1e-13, "{moment:?}");

@@ -26,129 +26,63 @@ pub struct Collocation<const S: usize> {
     pub powers: [[f64; S]; S],
 }
 
-/// The method of order 5.
-pub fn radau_iia_5() -> &'static Collocation<3> {
-    static RULE: OnceLock<Collocation<3>> = OnceLock::new();
-    RULE.get_or_init(make)
-}
-
 /// The method of order 9.
 pub fn radau_iia_9() -> &'static Collocation<5> {
     static RULE: OnceLock<Collocation<5>> = OnceLock::new();
-    RULE.get_or_init(make)
+    RULE.get_or_init(Collocation::make)
 }
 
-/// The method of order 13.
-pub fn radau_iia_13() -> &'static Collocation<7> {
-    static RULE: OnceLock<Collocation<7>> = OnceLock::new();
-    RULE.get_or_init(make)
-}
-
-fn make<const S: usize>() -> Collocation<S> {
-    let one = DoubleDouble::new(1.0);
-    let c = radau::nodes::<S>();
-    // The basis polynomial j is u/c_j prod_(k != j) (u - c_k)/(c_j - c_k): its factors, multiplied out one by one.
-    let mut powers = [[DoubleDouble::new(0.0); S]; S];
-    for j in 0..S {
-        // Coefficients of u^1 … u^S, starting from u/c_j.
-        let mut coefficients = [DoubleDouble::new(0.0); S];
-        coefficients[0] = one / c[j];
-        for (degree, k) in (0..S).filter(|&k| k != j).enumerate() {
-            let scale = one / (c[j] - c[k]);
-            for i in (0..=degree + 1).rev() {
-                let lower = if i > 0 { coefficients[i - 1] } else { DoubleDouble::new(0.0) };
-                let same = if i <= degree { coefficients[i] } else { DoubleDouble::new(0.0) };
-                coefficients[i] = scale * (lower - c[k] * same);
+impl<const S: usize> Collocation<S> {
+    /// The method, computed.
+    pub(in crate::numerics) fn make() -> Collocation<S> {
+        let one = DoubleDouble::new(1.0);
+        let c = radau::nodes::<S>();
+        // The basis polynomial j is u/c_j prod_(k != j) (u - c_k)/(c_j - c_k): its factors, multiplied out one by one.
+        let mut powers = [[DoubleDouble::new(0.0); S]; S];
+        for j in 0..S {
+            // Coefficients of u^1 … u^S, starting from u/c_j.
+            let mut coefficients = [DoubleDouble::new(0.0); S];
+            coefficients[0] = one / c[j];
+            for (degree, k) in (0..S).filter(|&k| k != j).enumerate() {
+                let scale = one / (c[j] - c[k]);
+                for i in (0..=degree + 1).rev() {
+                    let lower = if i > 0 { coefficients[i - 1] } else { DoubleDouble::new(0.0) };
+                    let same = if i <= degree { coefficients[i] } else { DoubleDouble::new(0.0) };
+                    coefficients[i] = scale * (lower - c[k] * same);
+                }
+            }
+            for k in 0..S {
+                powers[k][j] = coefficients[k];
             }
         }
-        for k in 0..S {
-            powers[k][j] = coefficients[k];
-        }
-    }
-    // Slopes at the nodes from differences of nodes, which are exact.
-    let zero = DoubleDouble::new(0.0);
-    let place = |i: usize| if i < S { c[i] } else { zero };
-    let weight = |i: usize| (0..=S).filter(|&k| k != i).fold(one, |product, k| product * (place(i) - place(k)));
-    let slope = |i: usize, j: usize| {
-        if i == j {
-            (0..=S).filter(|&k| k != i).fold(zero, |sum, k| sum + one / (place(i) - place(k)))
-        } else {
-            weight(i) / (weight(j) * (place(i) - place(j)))
-        }
-    };
-    // int_0^c_i of the polynomial of degree S - 1 in its powers; its coefficients are those of u^1 … u^S times c_j,
-    // less one power.
-    let integral = |i: usize, j: usize| {
-        let mut sum = zero;
-        let mut power = one;
-        for (k, row) in powers.iter().enumerate() {
-            power = power * c[i];
-            sum = sum + row[j] * c[j] * power / DoubleDouble::new((k + 1) as f64);
-        }
-        sum
-    };
-    Collocation {
-        nodes: c.map(|node| node.high),
-        differentiation: std::array::from_fn(|i| std::array::from_fn(|j| slope(i, j).high)),
-        start_slope: std::array::from_fn(|j| slope(S, j).high),
-        integration: std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j).high)),
-        powers: powers.map(|row| row.map(|value| value.high)),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    //! The coefficients satisfy their defining conditions to the last bits.
-
-    use super::*;
-
-    fn power(x: f64, n: usize) -> f64 {
-        (0..n).fold(1.0, |product, _| product * x)
-    }
-
-    fn conditions<const S: usize>(rule: &Collocation<S>) {
-        let near = |found: f64, expected: f64, size: f64| {
-            assert!((found - expected).abs() <= 4.0 * f64::EPSILON * size, "{S} stages: {found} {expected}");
-        };
-        assert_eq!(rule.nodes[S - 1], 1.0);
-        assert!(rule.nodes.windows(2).all(|pair| pair[0] > 0.0 && pair[0] < pair[1]));
-        for n in 1..=2 * S - 1 {
-            // The weights are the last row: quadrature of x^(n-1) up to the order of the method.
-            let sum: f64 = (0..S).map(|j| rule.integration[S - 1][j] * power(rule.nodes[j], n - 1)).sum();
-            near(sum, 1.0 / n as f64, 1.0);
-        }
-        let sum = |row: &[f64; S], f: &dyn Fn(f64) -> f64| {
-            let terms: Vec<f64> = (0..S).map(|j| row[j] * f(rule.nodes[j])).collect();
-            (terms.iter().sum::<f64>(), terms.iter().map(|term| term.abs()).sum::<f64>())
-        };
-        for n in 1..=S {
-            for i in 0..S {
-                let c = rule.nodes[i];
-                let (integral, size) = sum(&rule.integration[i], &|x| power(x, n - 1));
-                near(integral, power(c, n) / n as f64, size);
-                let (slope, size) = sum(&rule.differentiation[i], &|x| power(x, n));
-                near(slope, n as f64 * power(c, n - 1), size);
-                let (coefficient, size) = sum(&rule.powers[i], &|x| power(x, n));
-                near(coefficient, if i + 1 == n { 1.0 } else { 0.0 }, size);
+        // Slopes at the nodes from differences of nodes, which are exact.
+        let zero = DoubleDouble::new(0.0);
+        let place = |i: usize| if i < S { c[i] } else { zero };
+        let weight = |i: usize| (0..=S).filter(|&k| k != i).fold(one, |product, k| product * (place(i) - place(k)));
+        let slope = |i: usize, j: usize| {
+            if i == j {
+                (0..=S).filter(|&k| k != i).fold(zero, |sum, k| sum + one / (place(i) - place(k)))
+            } else {
+                weight(i) / (weight(j) * (place(i) - place(j)))
             }
-            let (slope, size) = sum(&rule.start_slope, &|x| power(x, n));
-            near(slope, if n == 1 { 1.0 } else { 0.0 }, size);
+        };
+        // int_0^c_i of the polynomial of degree S - 1 in its powers; its coefficients are those of u^1 … u^S times c_j,
+        // less one power.
+        let integral = |i: usize, j: usize| {
+            let mut sum = zero;
+            let mut power = one;
+            for (k, row) in powers.iter().enumerate() {
+                power = power * c[i];
+                sum = sum + row[j] * c[j] * power / DoubleDouble::new((k + 1) as f64);
+            }
+            sum
+        };
+        Collocation {
+            nodes: c.map(|node| node.high),
+            differentiation: std::array::from_fn(|i| std::array::from_fn(|j| slope(i, j).high)),
+            start_slope: std::array::from_fn(|j| slope(S, j).high),
+            integration: std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j).high)),
+            powers: powers.map(|row| row.map(|value| value.high)),
         }
-    }
-
-    #[test]
-    fn collocation_conditions_hold() {
-        conditions(radau_iia_5());
-        conditions(radau_iia_9());
-        conditions(radau_iia_13());
-    }
-
-    #[test]
-    fn reference_order_5_has_the_nodes_of_the_book() {
-        // Hairer and Wanner, Solving Ordinary Differential Equations II, table IV.5.6: (4 -+ sqrt 6)/10 and 1.
-        let root = 6.0_f64.sqrt();
-        let nodes = radau_iia_5().nodes;
-        assert!((nodes[0] - (4.0 - root) / 10.0).abs() < 1e-16 && (nodes[1] - (4.0 + root) / 10.0).abs() < 2e-16);
-        assert!((radau_iia_5().integration[2][0] - (16.0 - root) / 36.0).abs() < 1e-16);
     }
 }

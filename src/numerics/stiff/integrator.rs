@@ -18,30 +18,6 @@ pub struct Accuracy<const N: usize> {
     pub scale: [f64; N],
 }
 
-/// Statistics of an integration; equal on every machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct IntegratorStats {
-    /// Accepted steps.
-    pub steps: u32,
-    /// Steps rejected for their error or because Newton's method failed.
-    pub rejected: u32,
-    /// Evaluations of the equations: at all stages at once, or at the start for the error estimate.
-    pub evaluations: u32,
-    /// Factorisations.
-    pub factorisations: u32,
-}
-
-/// The failure of an integration.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Failure {
-    /// No step is short enough: the solution ends here, usually because it becomes infinite.
-    #[error("the solution ends at t = {t}: no step is short enough")]
-    Ends {
-        /// The time.
-        t: f64,
-    },
-}
-
 /// An integration in progress: Radau IIA with `S` stages, order `2 S - 1`, over `N` variables.
 #[derive(Debug, Clone)]
 pub struct Integrator<'a, Y, const N: usize, const S: usize> {
@@ -60,7 +36,6 @@ pub struct Integrator<'a, Y, const N: usize, const S: usize> {
     /// Length proposed for the next step.
     h: f64,
     last: Option<LastStep<N, S>>,
-    cost: IntegratorStats,
 }
 
 /// The last step, with its error estimate relative to the allowed error.
@@ -100,20 +75,8 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         // The estimate is of order S, the error of order 2 S - 1.
         let fraction = (S + 1) as f64 / (2 * S) as f64;
         let allowed = exp(fraction * ln(accuracy.tolerance));
-        let (t, cost) = (DoubleDouble::new(t), IntegratorStats::default());
-        Integrator {
-            system,
-            rule,
-            accuracy,
-            allowed,
-            t,
-            rest: 0.0,
-            shortest: MIN_STEP_FRACTION,
-            y,
-            h,
-            last: None,
-            cost,
-        }
+        let (t, shortest) = (DoubleDouble::new(t), MIN_STEP_FRACTION);
+        Integrator { system, rule, accuracy, allowed, t, rest: 0.0, shortest, y, h, last: None }
     }
 
     /// Allows steps down to this fraction of the time before them. A solution that becomes infinite then takes more steps to detect.
@@ -134,11 +97,6 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// Length proposed for the next step, also for a new integration that continues from here.
     pub fn proposal(&self) -> f64 {
         self.h
-    }
-
-    /// The statistics so far.
-    pub fn cost(&self) -> IntegratorStats {
-        self.cost
     }
 
     /// Continues from other variables at the same time, which satisfy the constraints, with a first step of about `h > 0`.
@@ -170,33 +128,28 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         self.t = t;
     }
 
-    /// Takes one step, which ends at `limit` at the latest, and then exactly there.
-    ///
-    /// # Errors
-    ///
-    /// The reason why no step is accurate.
+    /// Takes one step, which ends at `limit` at the latest, and then exactly there. `None` if no step is short enough: the solution ends here,
+    /// usually because it becomes infinite.
     #[inline(always)]
-    pub fn step(&mut self, limit: f64) -> Result<DenseOutput<N, S>, Failure> {
+    pub fn step(&mut self, limit: f64) -> Option<DenseOutput<N, S>> {
         loop {
             let left = self.left(limit);
             let cut = self.h >= left;
             let h = if cut { left } else { self.h };
             let advances = h > self.shortest * self.t.high;
             if !advances {
-                return Err(Failure::Ends { t: self.t.high });
+                return None;
             }
             let guess = self.guess(h);
             let start = self.y;
             let solved = self.stages(self.t.high, &start, h, guess);
             let tried = solved.and_then(|solved| Some((solved, self.error(h, &solved.change)? / self.allowed)));
             let Some((NodeChanges { change, iterations }, error)) = tried else {
-                self.cost.rejected += 1;
                 self.h = 0.3 * h;
                 continue;
             };
             let factor = self.factor(h, error, iterations);
             if error > 1.0 {
-                self.cost.rejected += 1;
                 self.h = h * if self.last.is_none() { 0.1 } else { factor.clamp(0.1, 0.8) };
                 continue;
             }
@@ -210,8 +163,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             }
             self.y = dense_output.end;
             self.last = Some(LastStep { dense_output, error });
-            self.cost.steps += 1;
-            return Ok(dense_output);
+            return Some(dense_output);
         }
     }
 
@@ -285,13 +237,9 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         let mut before = f64::NAN;
         for iterations in 1..=MAX_ITERATIONS {
             let at = self.system.linearise(&self.points(t, y, h, &change));
-            self.cost.evaluations += 1;
             let matrix = match factors {
                 Some(factors) => factors,
-                None => {
-                    self.cost.factorisations += 1;
-                    Factors::new(self.rule, h, &at)?
-                }
+                None => Factors::new(self.rule, h, &at)?,
             };
             let mut delta = at.residual;
             matrix.solve(&mut delta);
@@ -361,7 +309,6 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
             points.slope[r][0] = sum / h;
         }
         let at = self.system.linearise(&points);
-        self.cost.evaluations += 1;
         let matrix: Square<N> = std::array::from_fn(|r| {
             std::array::from_fn(|c| {
                 let inertia = if r == c { at.mass[r][0] / (gamma * h) } else { 0.0 };
@@ -388,146 +335,4 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
 struct NodeChanges<const N: usize, const S: usize> {
     change: [[f64; S]; N],
     iterations: u32,
-}
-
-#[cfg(test)]
-mod tests {
-    //! Order, stiffness, constraints, error against tolerance, and exact statistics.
-
-    use super::*;
-    use crate::numerics::stiff::{Linearised, radau_iia_5, radau_iia_9, radau_iia_13};
-
-    /// `e^(w/4) c' = -e^(w/4) s`, `s' = c` and the constraint `w = c s`: a rotation.
-    struct Rotation;
-
-    impl System<3> for Rotation {
-        fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
-            let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[0.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
-            for i in 0..L {
-                let [c, s, w] = [0, 1, 2].map(|r: usize| points.y[r][i]);
-                let mass = exp(0.25 * w);
-                (at.mass[0][i], at.mass[1][i]) = (mass, 1.0);
-                at.residual[0][i] = mass * (-s - points.slope[0][i]);
-                at.residual[1][i] = c - points.slope[1][i];
-                at.residual[2][i] = w - c * s;
-                (at.jacobian[0][1][i], at.jacobian[0][2][i]) = (-mass, 0.25 * at.residual[0][i]);
-                at.jacobian[1][0][i] = 1.0;
-                (at.jacobian[2][0][i], at.jacobian[2][1][i], at.jacobian[2][2][i]) = (-s, -c, 1.0);
-            }
-            at
-        }
-    }
-
-    /// Greatest error at time `end` after steps of equal length.
-    fn error_of_equal_steps<const S: usize>(rule: &'static Collocation<S>, end: f64, steps: u32) -> f64 {
-        let accuracy = Accuracy { tolerance: 1e-13, scale: [1.0; 3] };
-        let mut integrator = Integrator::new(&Rotation, rule, accuracy, 0.0, [1.0, 0.0, 0.0], 1.0);
-        let h = end / f64::from(steps);
-        for _ in 0..steps {
-            let y = integrator.y;
-            let solved = integrator.stages(0.0, &y, h, [[0.0; S]; 3]).expect("converges");
-            integrator.y = DenseOutput::new(rule, 0.0, h, y, &solved.change).end;
-        }
-        let (sin, cos) = libm::sincos(end);
-        let exact = [cos, sin, sin * cos];
-        (0..3).map(|r| (integrator.y[r] - exact[r]).abs()).fold(0.0, f64::max)
-    }
-
-    fn assert_order<const S: usize>(rule: &'static Collocation<S>, h: f64) {
-        let (coarse, fine) = (error_of_equal_steps(rule, 12.0 * h, 12), error_of_equal_steps(rule, 12.0 * h, 24));
-        let order = libm::log2(coarse / fine);
-        let expected = (2 * S - 1) as f64;
-        assert!((order - expected).abs() < 0.11, "{S} stages: order {order}, errors {coarse:.1e} {fine:.1e}");
-    }
-
-    #[test]
-    fn order_is_that_of_the_method() {
-        assert_order(radau_iia_5(), 0.5);
-        assert_order(radau_iia_9(), 0.5);
-        assert_order(radau_iia_13(), 1.5);
-    }
-
-    /// `y' = -1e9 (y - cos t)`, and `x' = -y`: `x = -sin t - 1e-9 (2 - cos t)` after the layer.
-    struct Follower;
-
-    impl System<2> for Follower {
-        fn linearise<const L: usize>(&self, points: &Points<2, L>) -> Linearised<2, L> {
-            let rate = 1e9;
-            let mut at = Linearised { residual: [[0.0; L]; 2], mass: [[1.0; L]; 2], jacobian: [[[0.0; L]; 2]; 2] };
-            for i in 0..L {
-                at.residual[0][i] = -points.y[1][i] - points.slope[0][i];
-                at.residual[1][i] = -rate * (points.y[1][i] - libm::cos(points.t[i])) - points.slope[1][i];
-                (at.jacobian[0][1][i], at.jacobian[1][1][i]) = (-1.0, -rate);
-            }
-            at
-        }
-    }
-
-    fn follow(tolerance: f64) -> (f64, IntegratorStats) {
-        let accuracy = Accuracy { tolerance, scale: [1.0; 2] };
-        let mut integrator = Integrator::new(&Follower, radau_iia_9(), accuracy, 0.0, [0.0, 2.0], 1e-3);
-        while integrator.t() < 10.0 {
-            integrator.step(10.0).expect("goes on");
-        }
-        assert_eq!(integrator.t(), 10.0);
-        ((integrator.y()[0] + libm::sin(10.0) + 1e-9 * (2.0 - libm::cos(10.0))).abs(), integrator.cost())
-    }
-
-    #[test]
-    fn error_got_is_the_error_asked_through_a_layer_of_1e_9() {
-        for digits in 3..=11 {
-            let tolerance = libm::pow(10.0, -f64::from(digits));
-            let (error, _) = follow(tolerance);
-            assert!(error <= tolerance, "{error:.1e} at {tolerance:.0e}");
-        }
-    }
-
-    #[test]
-    fn work_is_known_exactly() {
-        let (_, cost) = follow(1e-8);
-        assert_eq!(cost, IntegratorStats { steps: 28, rejected: 7, evaluations: 105, factorisations: 42 });
-    }
-
-    /// `y' = e^y`, which is infinite at `t = e^-y(0)`.
-    struct FiniteTimeBlowUp;
-
-    impl System<1> for FiniteTimeBlowUp {
-        fn linearise<const L: usize>(&self, points: &Points<1, L>) -> Linearised<1, L> {
-            let rate = points.y[0].map(exp);
-            let mut at = Linearised { residual: [rate], mass: [[1.0; L]], jacobian: [[rate]] };
-            for i in 0..L {
-                at.residual[0][i] -= points.slope[0][i];
-            }
-            at
-        }
-    }
-
-    #[test]
-    fn a_solution_that_ends_reports_where() {
-        let accuracy = Accuracy { tolerance: 1e-10, scale: [1.0] };
-        let mut integrator = Integrator::new(&FiniteTimeBlowUp, radau_iia_9(), accuracy, 0.0, [0.0], 0.1);
-        let failure = loop {
-            if let Err(failure) = integrator.step(2.0) {
-                break failure;
-            }
-        };
-        let Failure::Ends { t } = failure;
-        assert!((t - 1.0).abs() < 1e-10, "{failure}");
-        assert_eq!(integrator.cost().steps, 280);
-    }
-
-    #[test]
-    fn part_of_a_step_has_the_order_of_the_method() {
-        let accuracy = Accuracy { tolerance: 1e-6, scale: [1.0; 3] };
-        let mut integrator = Integrator::new(&Rotation, radau_iia_9(), accuracy, 0.0, [1.0, 0.0, 0.0], 0.1);
-        let (mut dense, mut exact) = (0.0_f64, 0.0_f64);
-        while integrator.t() < 6.0 {
-            let dense_output = integrator.step(6.0).expect("goes on");
-            let part = integrator.between(&dense_output, 0.0, 0.4).expect("converges");
-            let cos = libm::cos(dense_output.t + 0.4 * dense_output.h);
-            dense = dense.max((dense_output.value(0, 0.4) - cos).abs());
-            exact = exact.max((part.end[0] - cos).abs());
-        }
-        assert!(exact < 1e-6 && exact < 0.1 * dense, "{dense:.1e} {exact:.1e}");
-    }
 }

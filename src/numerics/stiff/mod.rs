@@ -1,4 +1,4 @@
-//! Stiff initial value problems of a few variables: Radau IIA collocation of order 5, 9 or 13, without memory allocation.
+//! Stiff initial value problems of a few variables: Radau IIA collocation of order 9, without memory allocation.
 //!
 //! A [`System`] is a set of equations `mass y' = f(t, y)`; a mass of 0 makes a constraint of index 1. It returns its residual and its Jacobian
 //! at several points at once. An [`Integrator`] takes steps along a solution; each is a [`DenseOutput`], the collocation polynomial.
@@ -23,12 +23,11 @@
 //! let accuracy = Accuracy { tolerance: 1e-8, scale: [1.0] };
 //! let mut integrator = Integrator::new(&Follower, radau_iia_9(), accuracy, 0.0, [0.0], 1e-3);
 //! while integrator.t() < 1.0 {
-//!     let piece = integrator.step(1.0)?;
+//!     let piece = integrator.step(1.0).expect("the solution goes on");
 //!     // Dense output: variable 0 half way along the step.
 //!     let _half_way = piece.value(0, 0.5);
 //! }
 //! assert!((integrator.y()[0] - exp(-1.0) * 1000.0 / 999.0).abs() < 1e-8);
-//! # Ok::<(), slipsweep::numerics::stiff::Failure>(())
 //! ```
 //!
 //! If the equations jump (a control that is sampled and held), end a step there, and continue with a new integrator whose first step is
@@ -47,7 +46,7 @@ mod dense_output;
 mod integrator;
 mod system;
 
-pub use collocation::{Collocation, radau_iia_5, radau_iia_9, radau_iia_13};
+pub use collocation::{Collocation, radau_iia_9};
 pub use dense_output::DenseOutput;
-pub use integrator::{Accuracy, Failure, Integrator, IntegratorStats};
+pub use integrator::{Accuracy, Integrator};
 pub use system::{Linearised, Points, System};

@@ -156,10 +156,10 @@ impl Extremal {
     /// The greatest friction along the extremal.
     pub fn friction_max(&self) -> Option<f64> {
         let friction = |fraction: f64| Some(self.law.a * scaled_friction(self.at(fraction)?.level));
-        let values: Option<Vec<f64>> = (0..=SCAN).map(|i| friction(f64::from(i) / f64::from(SCAN))).collect();
+        let values: Option<Vec<f64>> = (0..=INTERVALS).map(|i| friction(f64::from(i) / f64::from(INTERVALS))).collect();
         let values = values?;
         let (best, _) = values.iter().enumerate().max_by(|x, y| x.1.total_cmp(y.1))?;
-        let width = 1.0 / f64::from(SCAN);
+        let width = 1.0 / f64::from(INTERVALS);
         let place = best as f64 * width;
         let (mut low, mut high) = ((place - width).max(0.0), (place + width).min(1.0));
         let mut greatest = values[best];
@@ -173,8 +173,9 @@ impl Extremal {
     }
 }
 
-/// Intervals in which the greatest friction is sought. Chosen: friction has at most one maximum inside.
-const SCAN: u32 = 32;
+/// Intervals of an extremal, inside which friction has at most one maximum. Measured: with so many, all random optima of the physical domain can be
+/// traced (`cargo test random_optima`).
+pub(super) const INTERVALS: u32 = 32;
 
 /// Steps of the search for the greatest friction. Derived: `(2/3)^40` of an interval, squared at a maximum, is below rounding.
 const TERNARY_STEPS: u32 = 40;

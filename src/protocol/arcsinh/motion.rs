@@ -1,12 +1,9 @@
 //! An extremal of regularised friction over time.
 
-use super::extremal::{Extremal, Sums};
+use super::extremal::{Extremal, INTERVALS, Sums};
 use crate::model::Friction;
 use crate::protocol::motion::PieceTimes;
 use crate::protocol::{Moment, Motion, SolverStats};
-
-/// Intervals between landmarks. Measured: with so many, all random optima of the physical domain can be traced (`cargo test random_optima`).
-const INTERVALS: u32 = 32;
 
 /// The motion along an extremal; its parameter is the fraction of the coordinate.
 pub(super) struct ExtremalMotion {

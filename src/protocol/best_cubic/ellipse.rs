@@ -5,6 +5,7 @@
 //! depends on signs alone, so the method finds minima inside the set, on its border and at its corners, to all digits of the gradient.
 
 use super::plane::{Coefficients, Plane, moved};
+use crate::numerics::MAX_PANELS;
 use crate::protocol::SolverStats;
 
 /// An ellipse: the images of the unit circle under `half`, about `centre`.
@@ -36,8 +37,6 @@ pub(super) enum Until {
     Admissible,
 }
 
-/// Greatest number of cuts, most of which leave less than three quarters of the area. Chosen: a few hundred reach rounding.
-const MAX_CUTS: u32 = 1500;
 /// Relative rounding error of a coefficient. Derived: half a unit in the last place.
 const ROUNDING: f64 = 1e-16;
 /// Relative error of a linear function of the place by rounding of the place. Chosen: a hundred roundings of a double-double number.
@@ -93,7 +92,7 @@ impl Ellipse {
     /// Cuts until the centre is close to the minimum.
     pub fn close_in(&mut self, plane: &Plane, until: Until, stats: &mut SolverStats) -> CutResult {
         let mut found = None;
-        for _ in 0..MAX_CUTS {
+        for _ in 0..MAX_PANELS {
             // The condition that removes most of the ellipse.
             let mut worst: Option<(f64, [f64; 2])> = None;
             let mut spent = false;

@@ -10,9 +10,10 @@
 //! Both terms are at least 0, so the sum has full relative precision, however small it is.
 
 use crate::model::Transition;
+use crate::numerics::MAX_PANELS;
 use crate::numerics::cubic::ExactCubic;
 use crate::numerics::double_double::DoubleDouble;
-use crate::numerics::elementary::{ln, ln_1p};
+use crate::numerics::elementary::{ln, ln_1p, phi};
 use crate::numerics::gauss::rule;
 use crate::protocol::cubic::Path;
 use crate::protocol::{SolverStats, optimal};
@@ -25,8 +26,6 @@ const NEGLIGIBLE_ERROR: f64 = 1e-20;
 const NODES: usize = 12;
 /// Greatest number of halvings of a panel, which locate the kinks where the feedback leaves the floor. Chosen: 2^-30 is below the promised error.
 const MAX_BISECTIONS: u32 = 30;
-/// Greatest number of panels. Chosen: smooth cases take two to eight, a kink some thirty.
-const MAX_PANELS: u32 = 1000;
 /// Fraction of the shortcut's velocity below which that of the optimum may underflow. Chosen; the budgets of `best_cubic` judge it.
 const MIN_DENSITY: f64 = 1e-3;
 /// Ratio of the lengths of successive panels towards an end. Chosen: a graded mesh resolves the layer with a few panels.
@@ -177,21 +176,7 @@ fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
 
 /// `(1 + r) ln(1 + r) - r`, without cancellation near 0.
 fn entropy(r: f64) -> f64 {
-    if r.abs() < 0.1 {
-        // sum_k (-r)^k/(k (k - 1)) from k = 2: sixteen terms leave 1e-17 of the first.
-        let mut power = r * r;
-        let mut sum = 0.0;
-        for k in 2..18 {
-            let k = f64::from(k);
-            sum += power / (k * (k - 1.0));
-            power *= -r;
-        }
-        sum
-    } else if r > -1.0 {
-        (1.0 + r) * ln_1p(r) - r
-    } else {
-        1.0
-    }
+    if r > -1.0 { (1.0 + r) * phi(-ln_1p(r)) } else { 1.0 }
 }
 
 fn panel(density: &mut impl FnMut(f64) -> Option<f64>, from: f64, to: f64) -> Option<f64> {

@@ -8,6 +8,7 @@ use std::cell::Cell;
 
 use super::ellipse::Ellipse;
 use super::plane::{Bound, Coefficients, Constraint, Plane, moved};
+use crate::numerics::MAX_STEPS;
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::{SolverStats, Status};
 
@@ -20,8 +21,6 @@ const FRACTIONS: [f64; 4] = [0.99, 0.9, 0.7, 0.4];
 const VERTICES: usize = 32;
 /// Repetitions of that. Chosen: the first one takes the centre away from the border.
 const ROUNDS: usize = 3;
-/// Greatest number of Newton steps to the border. Chosen: it halves the distance at first, then converges quadratically.
-const MAX_STEPS: u32 = 100;
 /// Relative distance from the border within which a condition is active. Chosen: far above rounding.
 const ACTIVE: f64 = 1e-9;
 

@@ -106,7 +106,27 @@ pub(super) fn decide<'a>(all: Range<usize>, law: Law, path: impl Fn(usize) -> Pa
 impl Path<'_> {
     /// The least friction, or any negative friction on the path.
     pub fn friction_min(&self, law: Law) -> f64 {
-        let friction = |x: f64| {
+        let mut least = f64::INFINITY;
+        for friction in self.frictions(law) {
+            least = least.min(friction);
+            if least < 0.0 {
+                break;
+            }
+        }
+        least
+    }
+
+    /// The least and the greatest friction on the path.
+    pub fn friction_range(&self, law: Law) -> [f64; 2] {
+        self.frictions(law).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+    }
+
+    /// Friction where it may be least or greatest, places found with less work first.
+    fn frictions(&self, law: Law) -> impl Iterator<Item = f64> {
+        let stationary = move |end: f64| self.stationary(law, end).into_iter().map(move |d| (end - d).abs());
+        // The middle, at which both halves end, is stationary on symmetric paths.
+        let places = [0.0, 1.0, 0.5, self.theta.minimum(), self.n.minimum()].into_iter();
+        places.chain([0.0, 1.0].into_iter().flat_map(stationary)).map(move |x| {
             let (theta, n) = self.at(x);
             if n > 0.0 && theta > 0.0 {
                 1.0 + law.a * ln(n / self.ends.t_f) + (law.b - law.a) * ln(theta)
@@ -114,18 +134,7 @@ impl Path<'_> {
                 // The border of feasibility.
                 f64::NEG_INFINITY
             }
-        };
-        let lows = [0.0, 1.0, self.theta.minimum(), self.n.minimum()];
-        let mut least = lows.into_iter().map(friction).fold(f64::INFINITY, f64::min);
-        for end in [0.0, 1.0] {
-            if least < 0.0 {
-                break;
-            }
-            for d in self.stationary(law, end) {
-                least = least.min(friction(if end == 0.0 { d } else { 1.0 - d }));
-            }
-        }
-        least
+        })
     }
 
     /// The stationary points of friction in the half near an end, as distances from it: roots of `a n' theta + (b - a) n theta'`.

@@ -2,7 +2,7 @@
 
 use super::Landscape;
 use super::path::Path;
-use super::rules::zeros;
+use super::rules::Zeros;
 use crate::model::{Friction, StateLaw};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
@@ -30,7 +30,7 @@ impl Motion for CubicMotion {
     /// Points around each zero of `theta` and of `n = t_f (1 - theta')`; near a zero, `v = n/(t_f theta)` varies on the scale of its distance
     /// from the real interval.
     fn landmarks(&self) -> Vec<f64> {
-        let zeros = zeros(&self.path());
+        let zeros = Zeros::of(&self.path());
         let mut landmarks = vec![0.0, 1.0];
         for (&re, &im) in zeros.re.iter().zip(&zeros.im) {
             let centre = re.clamp(0.0, 1.0);

@@ -120,9 +120,6 @@ pub(super) struct NodeThresholds {
     pub longest: f64,
 }
 
-/// Loosest accuracy of the parts of a cut panel. Measured: at looser accuracies the residues of a close pair exceed [`LN_SAFETY_FACTOR`].
-const MAX_PARTS_TOLERANCE: f64 = 1e-5;
-
 /// The focal sums from which [`NODE_STEP`] nodes suffice for `tolerance`, then twice as many, and so on.
 fn focal_sums(tolerance: f64) -> [f64; MAX_NODES / NODE_STEP] {
     let mut focal = [0.0; MAX_NODES / NODE_STEP];
@@ -152,12 +149,6 @@ impl NodeThresholds {
         NodeThresholds { focal: focal_sums(tolerance), pace: pace(tolerance), rounding, slight, longest }
     }
 
-    /// The accuracy for the parts of a panel that is cut at a close pair of zeros: at low accuracies the residues of the pair exceed the margin.
-    pub fn of_parts(&self, tolerance: f64) -> NodeThresholds {
-        let tolerance = tolerance.min(MAX_PARTS_TOLERANCE);
-        NodeThresholds { focal: focal_sums(tolerance), pace: pace(tolerance), ..*self }
-    }
-
     /// The focal sum from which `nodes` suffice.
     #[inline(always)]
     pub fn enough(&self, nodes: usize) -> f64 {
@@ -174,8 +165,8 @@ impl NodeThresholds {
 /// The zeros of theta and of `1 - theta'` of one shortcut, padded to all lanes with very distant points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Zeros {
-    re: Lanes,
-    im: Lanes,
+    pub re: Lanes,
+    pub im: Lanes,
     /// Real parts minus 1, with all digits of a zero near the end.
     from_end: Lanes,
 }
@@ -188,18 +179,6 @@ pub(super) const THETA_ZEROS: usize = 3;
 
 /// Greatest distance of a zero. Chosen: farther zeros have no effect.
 pub(super) const MAX_ZERO_DISTANCE: f64 = 1e9;
-
-/// Zeros of theta and of `1 - theta'`; cheaper than [`Zeros::of`], but less accurate for a close pair at the start.
-pub(super) fn zeros(path: &Path) -> cubic::Zeros<ZEROS> {
-    let (theta, n) = path.about_end();
-    let mut zeros = rough_zeros(theta, n);
-    for (re, im) in zeros.re.iter_mut().zip(&mut zeros.im).take(THETA_ZEROS) {
-        if is_near_start(*re, *im) {
-            (*re, *im) = polished(&path.about_start().0, *re, *im).unwrap_or((*re, *im));
-        }
-    }
-    zeros
-}
 
 /// The zeros of several shortcuts, from the expansion about the end; zeros near the start are not yet [`polished`].
 #[inline(always)]

@@ -159,7 +159,7 @@ impl Sums<'_> {
         let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
         let mut plan = PlannedPanels::default();
-        plan_parts(&of.ends, parts, &of.accuracy_of_parts, &mut plan);
+        plan_parts(&of.ends, parts, &of.accuracy, &mut plan);
         let [a_2, a_3, low, high] = parts;
         for (k, &i) in indices.iter().enumerate() {
             stats.quadratures += 1;

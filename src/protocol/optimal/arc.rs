@@ -13,11 +13,11 @@
 use multiversion::multiversion;
 
 use crate::model::Law;
-use crate::numerics::MAX_SQUARABLE;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, polynomial, rough_ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, phi, phi_and_slope, rough_ln};
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
+use crate::numerics::{self, MAX_SQUARABLE};
 
 /// The chart that an arc is drawn in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,29 +160,6 @@ pub(super) fn friction_range(law: &Law, c: f64, [start, end]: &[ArcPoint; 2]) ->
 pub(super) fn steady_friction(law: &Law, ln_theta: f64) -> f64 {
     1.0 + (law.b - law.a) * ln_theta
 }
-
-/// `phi(z) = e^z - 1 - z`, the left side of the turning equation, without cancellation near 0.
-pub(super) fn phi(z: f64) -> f64 {
-    phi_and_slope(z).0
-}
-
-/// `phi(z)` and its derivative `e^z - 1`.
-pub(super) fn phi_and_slope(z: f64) -> (f64, f64) {
-    let slope = exp_m1(z);
-    let phi = if z.abs() < 0.25 { 0.5 * z * z * polynomial(&PHI_OVER_HALF_SQUARE, z) } else { slope - z };
-    (phi, slope)
-}
-
-/// `2/(n + 2)!`. Derived: twelve terms of `phi(z)/(z^2/2)` leave 2e-18 at `|z| = 1/4`.
-const PHI_OVER_HALF_SQUARE: [f64; 12] = {
-    let mut terms = [1.0; 12];
-    let mut n = 1;
-    while n < terms.len() {
-        terms[n] = terms[n - 1] / (n + 2) as f64;
-        n += 1;
-    }
-    terms
-};
 
 impl Arc {
     /// The conserved `C`.
@@ -379,7 +356,7 @@ impl Line {
     fn halved(&self, tolerance: f64, before: Sums, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
         let (mut total, mut panels) =
             (Sums { nodes: before.nodes, ..Sums::default() }, vec![(self.start, self.length)]);
-        for _ in 0..MAX_HALVINGS {
+        for _ in 0..numerics::MAX_PANELS {
             let Some((start, length)) = panels.pop() else { break };
             let half = 0.5 * length;
             let [coarse, fine] = [2 * LANES, 4 * LANES].map(|nodes| kernel(start + half, half, rule(nodes)));
@@ -508,9 +485,6 @@ const MAX_PANELS: u32 = 64;
 
 /// Relative difference of two rules that is rounding. Chosen: a hundred roundings.
 const AGREEMENT: f64 = 1e-14;
-
-/// Most panels that are visited where they are halved. Chosen: five times what two ends of sixty halvings need.
-const MAX_HALVINGS: u32 = 1000;
 
 /// Gauss nodes for relative accuracy `e^-digits` on a panel: the Bernstein ellipse through the nearest singularity.
 #[inline(always)]

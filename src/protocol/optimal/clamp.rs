@@ -5,14 +5,14 @@
 
 use std::cell::Cell;
 
-use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, phi, phi_and_slope, steady_friction};
+use super::arc::{Arc, ArcPoint, Chart, Sums, friction_range, steady_friction};
 use super::ceiling::{CeilingArc, Ceilings};
 use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use super::{ArcKind, floor};
 use crate::model::Law;
 use crate::numerics::MAX_STEPS;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi, phi_and_slope};
 
 /// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.
 #[derive(Debug, Clone, Copy)]
@@ -614,72 +614,3 @@ pub(super) struct Switch {
 
 /// `ln delta` below which squares of `delta` count as underflown: they are subnormal from -354 on. Chosen: a margin for their factors.
 const SQUARE_UNDERFLOW_LN: f64 = -300.0;
-
-#[cfg(test)]
-mod tests {
-    //! The analytic derivative of the time against differences of it, on every part of the clamped family.
-
-    use super::super::Bounds;
-    use super::*;
-
-    #[test]
-    fn rate_is_the_derivative_of_the_time_on_every_part_of_the_clamped_family() {
-        let laws = [(0.03, 0.05), (0.03, 0.03), (0.05, 0.01), (0.1, 0.0), (0.002, 0.02)];
-        let transitions = [(3.0, 100.0), (100.0, 3.0), (3.0, 3.0), (1.01, 40.0), (40.0, 1.01), (1e5, 1.001e5)];
-        let ceilings = [
-            (f64::INFINITY, f64::INFINITY),
-            (1.2, f64::INFINITY),
-            (20.0, f64::INFINITY),
-            (f64::INFINITY, 1e-3),
-            (f64::INFINITY, 0.05),
-            (3.0, 0.05),
-            (300.0, 0.02),
-        ];
-        let mut seen = 0;
-        for (a, b) in laws {
-            for (v_i, v_f) in transitions {
-                for (times, above) in ceilings {
-                    for floor in [true, false] {
-                        let law = Law { a, b };
-                        let steady = |v: f64| 1.0 + (a - b) * f64::ln(v);
-                        let bounds =
-                            Bounds { floor, v_ceiling: times * v_f, tau_ceiling: steady(v_i).max(steady(v_f)) + above };
-                        let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
-                        let problem = Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded: floor };
-                        let ceilings = Ceilings::new(law, [v_i, v_f], problem.depth(), &bounds);
-                        let q_floor = problem.q_floor();
-                        for i in -30..=30 {
-                            let q = 0.2501 * f64::from(i);
-                            let step = 1e-5;
-                            let at = |q: f64| {
-                                let extremal = problem.extremal(q, q_floor)?;
-                                let path = Path::clamped(&problem, &ceilings, extremal, &Switches::unknown())?;
-                                let (sums, rate) = path.sums(1e-14)?;
-                                Some(([sums.time, rate], path.signature()))
-                            };
-                            let (Some(before), Some(here), Some(after)) = (at(q - step), at(q), at(q + step)) else {
-                                continue;
-                            };
-                            let clamps = times.min(above) < f64::INFINITY;
-                            if before.1 != after.1 || (clamps && here.1 < 4) || here.0[0] < 1e-9 {
-                                continue;
-                            }
-                            if q.abs() < 2.0 * step || q_floor.is_some_and(|h| (q + h).abs() < 2.0 * step) {
-                                continue;
-                            }
-                            let difference = (after.0[0] - before.0[0]) / (2.0 * step);
-                            let [time, rate] = here.0;
-                            let error = (difference - rate).abs() / rate.abs().max(1e-3 * time);
-                            seen += 1;
-                            assert!(
-                                error <= if clamps { 1e-4 } else { 1e-5 },
-                                "{a} {b} {v_i} -> {v_f} {bounds:?} q {q}: rate {rate} difference {difference}"
-                            );
-                        }
-                    }
-                }
-            }
-        }
-        assert!(seen > 10_000, "{seen}");
-    }
-}

@@ -1,16 +1,16 @@
 //! The optimum under ceilings: the free one where it obeys them, else the clamped extremal of the same family that takes
 //! the given time.
 
-use super::arc::{Sums, phi};
+use super::arc::Sums;
 use super::ceiling::Ceilings;
 use super::clamp::{Path, PathView, Switch, Switches, falling_part};
 use super::extremal::{MAX_LN_U, Problem};
-use super::guess::{Guess, QUADRATURE_ERROR, capped_guess};
+use super::guess::{Guess, QUADRATURE_ERROR, UNKNOWN_TIME_ERROR, capped_guess};
 use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum};
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::turning;
 use crate::protocol::{Solved, SolverStats, Status};
@@ -448,9 +448,6 @@ const SLOPE_CHANGES: f64 = 1e-4;
 
 /// Tolerance of the last quadrature, in units of that of a free search. Chosen: fine enough for most short arcs as well, which saves a quadrature.
 const LAST_TOLERANCE_RATIO: f64 = 0.02;
-
-/// Expected relative error of the time where nothing is known. Chosen: quadratures start at the largest tolerance.
-const UNKNOWN_TIME_ERROR: f64 = 0.1;
 
 /// Fraction of the time below which all arcs on ceilings together are short. Derived: as a difference of times, a longer one loses at most one digit.
 const SHORT_CEILING_TIME: f64 = 0.1;

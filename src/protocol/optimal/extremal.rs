@@ -14,11 +14,11 @@
 //!
 //! A search counts `q` from `q_floor` where that exists, so that short floor arcs keep their digits.
 
-use super::arc::{Arc, Chart, Sums, omega, phi, phi_and_slope, steady_friction};
+use super::arc::{Arc, Chart, Sums, omega, steady_friction};
 use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi, phi_and_slope};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::Turning;
 

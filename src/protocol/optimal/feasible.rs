@@ -15,6 +15,16 @@ pub fn feasible_times(transition: &Transition, bounds: impl Into<Bounds>) -> Opt
     feasible(&problem, &ceilings).times()
 }
 
+/// Time of an acceleration with friction at its ceiling throughout, a jump without one; `None` where friction at an end is above it.
+pub fn acceleration_time_at_ceiling(transition: &Transition, tau_ceiling: f64) -> Option<f64> {
+    let (problem, &Transition { law, v_i, v_f }) = (Problem::between(transition, false), transition);
+    let bounds = Bounds::new(false).with_tau_ceiling(tau_ceiling);
+    if tau_ceiling == f64::INFINITY {
+        return Some(0.0);
+    }
+    Some(feasible(&problem, &Ceilings::new(law, [v_i, v_f], problem.depth(), &bounds)).times()?.0)
+}
+
 /// Why a protocol is infeasible; `None` for a feasible one.
 pub fn obstacle(transition: &Transition, t_f: f64, bounds: impl Into<Bounds>) -> Option<Obstacle> {
     let Some((problem, ceilings)) = posed(transition, t_f, &bounds.into()) else { return Some(Obstacle::Domain) };

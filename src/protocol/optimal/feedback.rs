@@ -11,7 +11,7 @@ use super::search::{self, Time};
 use super::{ArcKind, Bounds, FeedbackPoint, INFEASIBLE, Optimum, Strategy, slopes};
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi};
 use crate::protocol::{Motion, Solved, SolverStats, Status};
 
 /// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
@@ -141,7 +141,8 @@ pub fn feedback(
     } else if !bounded {
         (margin, margin)
     } else if aged < 0.5 {
-        let parts = [margin / to.rest, above_ln_1p(aged)];
+        // aged - ln(1 + aged) without cancellation.
+        let parts = [margin / to.rest, phi(ln_1p(aged))];
         (parts[0] + parts[1], parts[0].abs() + parts[1] - problem.rest_beyond())
     } else {
         (time_left - problem.t_min(), time_left)
@@ -174,15 +175,3 @@ pub fn feedback(
 
 /// Roundings of the terms of which the time beyond the least one is a difference. Chosen: those of some dozen operations.
 const ROUNDINGS: f64 = 64.0;
-
-/// `x - ln(1 + x)` for `0 <= x < 0.5`, without cancellation.
-fn above_ln_1p(x: f64) -> f64 {
-    // ln(1 + x) = 2 artanh s with s = x/(2 + x), and x - 2 s = s x.
-    let s = x / (2.0 + x);
-    let (square, mut power, mut sum) = (s * s, s, 0.0);
-    for k in 1..16 {
-        power *= square;
-        sum += power / f64::from(2 * k + 1);
-    }
-    s * x - 2.0 * sum
-}

@@ -2,12 +2,11 @@
 
 use multiversion::multiversion;
 
-use super::arc::phi;
 use super::ceiling::Ceilings;
 use super::extremal::Problem;
 use crate::model::Law;
 use crate::numerics::MAX_LN;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::turning::{rough_excess, turning};
@@ -35,7 +34,7 @@ impl Guess {
         {
             return Guess { q_floor, p: z_0 - q_floor.unwrap_or(0.0), error: QUADRATURE_ERROR };
         }
-        Guess { q_floor, p, error: LINE_ERROR }
+        Guess { q_floor, p, error: UNKNOWN_TIME_ERROR }
     }
 }
 
@@ -69,10 +68,10 @@ fn ceilings_at(ceilings: &Ceilings, arcs: &Falling, x: &[f64; SHORT_NODES]) -> [
     caps
 }
 
-/// Usual error of the line. Measured: it decides only the tolerance of the first quadrature (`cargo bench --bench optimal`).
-const LINE_ERROR: f64 = 0.1;
+/// Expected relative error of the time before any quadrature. Measured: it decides only the tolerance of the first one (`cargo bench --bench optimal`).
+pub(super) const UNKNOWN_TIME_ERROR: f64 = 0.1;
 
-/// Usual error of the coarse quadrature. Measured, as [`LINE_ERROR`].
+/// Error of the coarsest quadrature. Measured: coarser ones cost more steps (`cargo bench --bench optimal`).
 pub(super) const QUADRATURE_ERROR: f64 = 1e-4;
 
 fn line(problem: &Problem, q_floor: Option<f64>, beyond: f64) -> f64 {

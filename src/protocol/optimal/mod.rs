@@ -31,7 +31,7 @@ use motion::OptimalMotion;
 use search::{FreeOptimum, Time};
 
 pub use bounds::Bounds;
-pub use feasible::{feasible_times, least_tau_ceiling, least_v_ceiling, obstacle};
+pub use feasible::{acceleration_time_at_ceiling, feasible_times, least_tau_ceiling, least_v_ceiling, obstacle};
 pub(super) use feedback::{Position, feedback};
 pub use feedback::{feedback_at, motion_from};
 pub(super) use route::{PathPoint, PathSegment, Route, lag_at_bound};
@@ -276,12 +276,12 @@ impl Problem {
         let &Transition { law, v_i, v_f } = transition;
         let inside = law.a > 0.0 && law.b >= 0.0 && v_i > 1.0 && v_f > 1.0;
         let finite = law.a.is_finite() && law.b.is_finite() && v_i.is_finite() && v_f.is_finite();
-        (inside && finite).then(|| Problem {
-            law,
-            from: Lifetime::steady(v_i),
-            to: Lifetime::steady(v_f),
-            fall: (v_f - v_i) / v_i,
-            bounded,
-        })
+        (inside && finite).then(|| Problem::between(transition, bounded))
+    }
+
+    /// The problem of a transition between steady states, which may lie at `v = 1`.
+    fn between(&Transition { law, v_i, v_f }: &Transition, bounded: bool) -> Problem {
+        let (from, to) = (Lifetime::steady(v_i), Lifetime::steady(v_f));
+        Problem { law, from, to, fall: (v_f - v_i) / v_i, bounded }
     }
 }

@@ -5,9 +5,9 @@ use super::extremal::{Extremal, Problem};
 use super::floor;
 use super::motion::{Floor, Timed};
 use crate::model::Law;
-use crate::numerics::MAX_STEPS;
-use crate::numerics::elementary::{exp, exp_m1, ln};
+use crate::numerics::elementary::{exp, exp_m1, phi};
 use crate::numerics::radau::radau;
+use crate::numerics::root::crossing;
 use crate::protocol::control::{Jet, Tolerance, ValueRange};
 
 /// A place on the protocol.
@@ -257,48 +257,19 @@ impl Timed {
 
 /// `int theta v dt` over a time on `v = 1`, from theta on: no difference of times, of which it may be a small part.
 pub fn lag_at_bound(theta: f64, time: f64) -> f64 {
-    // t - 1 + e^-t.
-    let idle = if time < 0.1 {
-        // Each term is less than a thirtieth of the one before.
-        (3..14).rev().fold(1.0, |sum, k| 1.0 - time / f64::from(k) * sum) * 0.5 * time * time
-    } else {
-        time + exp_m1(-time)
-    };
-    idle - theta * exp_m1(-time)
+    phi(-time) - theta * exp_m1(-time)
 }
 
 /// Most landmarks of a floor arc. Chosen: beyond, `e^-100`, nothing changes any more.
 const MAX_MARKS: usize = 100;
 
-/// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value: bracketed secants of its logarithm.
+/// The argument in `[0, most]` at which a rising function with f(0) = 0 takes a value.
 fn inverse(value: f64, most: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = (0.0, most);
-    let mut last = (most, f(most));
-    let mut d = most * (value / last.1).clamp(0.0, 1.0);
-    for _ in 0..MAX_STEPS {
-        let found = f(d);
-        if found < value {
-            low = d;
-        } else {
-            high = d;
-        }
-        let order = ln(last.1 / found) / ln(last.0 / d);
-        last = (d, found);
-        // The last step leaves less than the square of what it started from; the rounding of places leaves more.
-        let is_close = (found / value - 1.0).abs() <= LAST_STEP_RTOL;
-        let next = d * exp(ln(value / found) / order);
-        // Rounding of places may leave no slope.
-        let is_inside = next > low && next < high;
-        d = if is_inside || is_close { next } else { 0.5 * (low + high) };
-        if is_close || high - low <= f64::EPSILON * high {
-            break;
-        }
-    }
-    if d.is_finite() { d.clamp(0.0, most) } else { last.0 }
+    let excess = |d: f64| f(d) - value;
+    let last = excess(most);
+    // Rounding may leave it at the end.
+    if last <= 0.0 { most } else { crossing(excess, [0.0, most], [-value, last], f64::EPSILON * most).clamp(0.0, most) }
 }
-
-/// A relative difference after which one more step is enough. Derived: a step squares it.
-const LAST_STEP_RTOL: f64 = 1e-8;
 
 #[cfg(test)]
 mod tests {

@@ -4,7 +4,7 @@ use super::arc::{ArcPoint, Sums};
 use super::ceiling::Ceilings;
 use super::clamp::PathView;
 use super::extremal::{Extremal, MAX_LN_U, Problem};
-use super::guess::Guess;
+use super::guess::{Guess, QUADRATURE_ERROR};
 use super::{ArcKind, Optimum, Strategy, floor};
 use crate::numerics::ROUNDING_RTOL;
 use crate::numerics::elementary::exp;
@@ -474,12 +474,9 @@ impl Accuracy {
         if self.may_end(next, Some(value)) {
             return self.exact;
         }
-        (0.06 * Accuracy::left(next, Some(value))).min(COARSEST).max(self.exact)
+        (0.06 * Accuracy::left(next, Some(value))).min(QUADRATURE_ERROR).max(self.exact)
     }
 }
-
-/// Largest tolerance of a probe. Measured: coarser ones cost more steps (`cargo bench --bench optimal`).
-const COARSEST: f64 = 1e-4;
 
 /// `t_f = t_min`: the floor arc alone.
 fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {

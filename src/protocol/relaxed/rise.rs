@@ -8,7 +8,7 @@ use std::f64::consts::E;
 
 use super::{Chatter, Problem, Relaxed};
 use crate::numerics::ROUNDING_RTOL;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi};
 use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, crossing, newton};
 use crate::numerics::wright::wright_omega;
@@ -175,13 +175,11 @@ impl Rise {
         let ln_growth = ln_1p(growth / (1.0 + r1));
         let slip = change - fall - ln_growth;
         let left = exp(-to.omega);
-        let bend = exp_m1_beyond(-fall);
-        let left_at_start = left * (1.0 + (bend - fall));
-        let late = |omega: f64, left: f64| if omega > 0.5 { left - 1.0 + omega } else { exp_m1_beyond(-omega) };
+        let bend = phi(-fall);
         // 1 - (1 + omega) e^-omega.
-        let early = if to.omega > 0.5 { 1.0 - (1.0 + to.omega) * left } else { left * exp_m1_beyond(to.omega) };
+        let early = left * phi(to.omega);
         let by_strength = to.strength * (fall * early + to.omega * left * bend) / (from.omega * to.omega);
-        let by_weakening = fall + ln_growth - change * late(from.omega, left_at_start) / from.omega;
+        let by_weakening = fall + ln_growth - change * phi(-from.omega) / from.omega;
         // The derivatives of both ends with respect to ln h.
         let moved = |place: &ArcPoint, r: f64| place.strength / ((1.0 + place.omega) * (1.0 + r));
         let by_level = c * (slip - 1.0 / (1.0 + r1) + 1.0 / (1.0 + r0));
@@ -323,14 +321,4 @@ impl Rise {
 /// `T = 1 + c ln theta` at `-ln theta`.
 fn strength(problem: &Problem, below_floor: f64) -> f64 {
     1.0 - problem.weakening() * below_floor
-}
-
-/// `e^x - 1 - x`.
-fn exp_m1_beyond(x: f64) -> f64 {
-    if x.abs() > 0.5 {
-        return exp_m1(x) - x;
-    }
-    // The next term is 1e-18 of the first.
-    let tail = (3..=15).rev().fold(1.0, |sum, n| 1.0 + sum * x / f64::from(n));
-    0.5 * x * x * tail
 }

@@ -79,7 +79,7 @@ impl Motion for Relaxation {
         let relaxed = RELAXED_P + ln_1p(self.decay.k.max(0.0));
         let mut landmarks = vec![0.0];
         let mut p = finest_scale;
-        while p < 0.9 * end && landmarks.len() < MAX_LANDMARKS {
+        while p < 0.9 * end {
             landmarks.push(ln_1p(p / finest_scale) / ln_1p(end / finest_scale));
             // Steps double, but are at most 1 while theta relaxes.
             p += if p < relaxed { p.min(1.0) } else { p };
@@ -103,9 +103,6 @@ impl Motion for Relaxation {
         }
     }
 }
-
-/// Landmarks, at most. Chosen: more than a time of 1e300 takes.
-const MAX_LANDMARKS: usize = 1200;
 
 /// Relaxation of theta, `1 + k e^-p`, where `k = ratio - 1 > -1`.
 #[derive(Debug, Clone, Copy)]

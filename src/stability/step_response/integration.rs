@@ -8,8 +8,9 @@ use multiversion::multiversion;
 
 use super::scaled_block::{Rates, ScaledBlock, State, X, Y};
 use super::series::{Powers, TERMS, reach};
+use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, ln};
-use crate::numerics::stiff::{Accuracy, DenseOutput, Failure, Integrator, IntegratorStats, radau_iia_9};
+use crate::numerics::stiff::{Accuracy, DenseOutput, Integrator, radau_iia_9};
 
 /// Stages of an implicit step: order 9.
 pub const STAGES: usize = 5;
@@ -34,7 +35,6 @@ pub struct Integration<'a> {
     implicit_from: f64,
     /// Whether steps are series.
     uses_series: bool,
-    series: u32,
 }
 
 /// Length of a series, in units of the fastest motion, at most. Chosen: about the stability interval of a series of order
@@ -43,9 +43,6 @@ const MAX_REACH: f64 = 5.0;
 
 /// Change of `ln theta` in a series, at most. Chosen: beyond it terms of `1/theta` below the rounding of the others grow.
 const MAX_CHANGE: f64 = 6.0;
-
-/// Reductions of a series for [`MAX_CHANGE`], at most. Chosen: where the velocity falls, the first one is too small.
-const MAX_CUTS: u32 = 6;
 
 /// Length of a step, in units of the fastest motion, above which steps are implicit. Measured: both kinds cost as much
 /// there (`cargo bench --bench step_response`).
@@ -76,7 +73,7 @@ impl ScaledBlock {
         let order = TERMS as f64;
         let rounding = exp((ln(tolerance / f64::EPSILON) + libm::lgamma(order + 1.0)) / order);
         let implicit_from = IMPLICIT_FROM.min(0.7 * rounding);
-        Integration { slider: self, integrator, accuracy, implicit_from, uses_series: true, series: 0 }
+        Integration { slider: self, integrator, accuracy, implicit_from, uses_series: true }
     }
 }
 
@@ -96,15 +93,10 @@ impl Integration<'_> {
         self.integrator.jump(state, h);
     }
 
-    /// Number of series, and statistics of the implicit steps.
-    pub fn cost(&self) -> (u32, IntegratorStats) {
-        (self.series, self.integrator.cost())
-    }
-
     #[inline(always)]
-    fn step(&mut self, limit: f64) -> Result<IntegrationStep, Failure> {
+    fn step(&mut self, limit: f64) -> Option<IntegrationStep> {
         match self.expand(limit) {
-            Some(step) => Ok(IntegrationStep::Taylor(step)),
+            Some(step) => Some(IntegrationStep::Taylor(step)),
             None => self.integrator.step(limit).map(IntegrationStep::Implicit),
         }
     }
@@ -131,7 +123,7 @@ impl Integration<'_> {
         let mut length = h.min(self.integrator.left(limit));
         let over = |h: f64| DenseOutput::from_powers(self.t(), h, state, stretched(&powers, h / unit));
         let mut step = over(length);
-        for _ in 0..MAX_CUTS {
+        for _ in 0..MAX_STEPS {
             let change = (step.end[Y] - state[Y]).abs();
             if change <= MAX_CHANGE {
                 break;
@@ -141,7 +133,6 @@ impl Integration<'_> {
         }
         let advances = step.end.iter().all(|end| end.is_finite()) && self.integrator.leap(length, step.end, h);
         self.uses_series = advances;
-        self.series += u32::from(advances);
         advances.then_some(step)
     }
 }
@@ -159,16 +150,12 @@ fn stretched(powers: &Powers, factor: f64) -> Powers {
     scaled
 }
 
-/// Takes one step, which ends at `limit` at the latest.
-///
-/// # Errors
-///
-/// The failure of the implicit step.
+/// Takes one step, which ends at `limit` at the latest; `None` if no step is short enough.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-pub fn step_to(run: &mut Integration<'_>, limit: f64) -> Result<IntegrationStep, Failure> {
+pub fn step_to(run: &mut Integration<'_>, limit: f64) -> Option<IntegrationStep> {
     run.step(limit)
 }
 
@@ -180,21 +167,25 @@ pub fn substep(run: &mut Integration<'_>, step: &IntegrationStep, from: f64, to:
     }
 }
 
+/// A value of a step of either kind.
+macro_rules! of_step {
+    ($self:ident, $step:ident => $value:expr) => {
+        match $self {
+            IntegrationStep::Implicit($step) => $value,
+            IntegrationStep::Taylor($step) => $value,
+        }
+    };
+}
+
 impl IntegrationStep {
     /// Time at its start.
     pub fn t(&self) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.t,
-            IntegrationStep::Taylor(step) => step.t,
-        }
+        of_step!(self, step => step.t)
     }
 
     /// Duration.
     pub fn h(&self) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.h,
-            IntegrationStep::Taylor(step) => step.h,
-        }
+        of_step!(self, step => step.h)
     }
 
     /// Time at the fraction `u` of the step.
@@ -204,136 +195,21 @@ impl IntegrationStep {
 
     /// State at its start.
     pub fn start(&self) -> &State {
-        match self {
-            IntegrationStep::Implicit(step) => &step.start,
-            IntegrationStep::Taylor(step) => &step.start,
-        }
+        of_step!(self, step => &step.start)
     }
 
     /// State at its end.
     pub fn end(&self) -> &State {
-        match self {
-            IntegrationStep::Implicit(step) => &step.end,
-            IntegrationStep::Taylor(step) => &step.end,
-        }
+        of_step!(self, step => &step.end)
     }
 
     /// Variable `r` at the fraction `u` of the step.
     pub fn value(&self, r: usize, u: f64) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.value(r, u),
-            IntegrationStep::Taylor(step) => step.value(r, u),
-        }
+        of_step!(self, step => step.value(r, u))
     }
 
     /// Time derivative of variable `r` at the fraction `u` of the step.
     pub fn slope(&self, r: usize, u: f64) -> f64 {
-        match self {
-            IntegrationStep::Implicit(step) => step.slope(r, u),
-            IntegrationStep::Taylor(step) => step.slope(r, u),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    //! Order, obtained compared with requested error, and exact step counts.
-
-    use super::super::scaled_block::Z;
-    use super::*;
-    use crate::model::StateLaw;
-
-    /// The published material at `v_f = 3.2e6`.
-    const SLIDER: ScaledBlock =
-        ScaledBlock { state_law: StateLaw::Ageing, a: 0.005, b: 0.01, inertia: 2.56e-3, k: 7.5e-3 };
-
-    /// Near steady sliding, where errors are those of a linear problem.
-    const NEAR: State = [2e-5, 2e-3, 3e-3];
-
-    /// In a slip.
-    const SLIP: State = [-7e-3, 0.3, 0.4];
-
-    #[test]
-    fn order_of_a_series_is_its_number_of_terms() {
-        let step = |state: &State, h: f64| {
-            let powers = SLIDER.series(state, &Rates::of(StateLaw::Ageing, state[Y], state[X]), h);
-            DenseOutput::from_powers(0.0, h, *state, powers)
-        };
-        let exact = |h: f64| (0..64).fold(NEAR, |state, _| step(&state, h / 64.0).end);
-        let error = |h: f64| {
-            let (found, expected) = (step(&NEAR, h).end, exact(h));
-            (0..3).map(|r| (found[r] - expected[r]).abs()).fold(0.0, f64::max)
-        };
-        // The local error is of one order more.
-        let order = libm::log2(error(0.7) / error(0.35)) - 1.0;
-        assert!((order - TERMS as f64).abs() < 0.3, "{order}");
-        // The first terms are the right-hand sides.
-        let [z, y, x] = SLIP;
-        let (v, ageing) = (exp(x), exp(-y));
-        let powers = SLIDER.series(&SLIP, &Rates::of(StateLaw::Ageing, y, x), 1.0);
-        let slopes = [SLIDER.k * (1.0 - v), ageing - v, (z - SLIDER.a * x - SLIDER.b * y) / (SLIDER.inertia * v)];
-        for r in [Z, Y, X] {
-            assert!((powers[r][0] / slopes[r] - 1.0).abs() < 1e-15, "{r}");
-        }
-    }
-
-    /// State at the end of a response, its upward crossings of `v_f`, and its step counts.
-    fn follow(k: f64, t_end: f64, tolerance: f64) -> (State, usize, u32, IntegratorStats) {
-        let slider = ScaledBlock { k, ..SLIDER };
-        let start = slider.steady(-32.0_f64.ln());
-        let mut run = slider.run(start, slider.first_step(&start), tolerance);
-        let mut rises = 0;
-        while run.t() < t_end {
-            if let Some(arrested) = slider.arrest(run.y()) {
-                run.jump(arrested, slider.first_step(&arrested));
-            }
-            let step = step_to(&mut run, t_end).expect("goes on");
-            let values: Vec<f64> = (0..=8).map(|i| step.value(X, f64::from(i) / 8.0)).collect();
-            rises += values.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
-        }
-        let (series, cost) = run.cost();
-        (*run.y(), rises, series, cost)
-    }
-
-    /// The published response over 50 periods and deep stick-slip over 50 peaks: the cases of `benches/peers`, with the final
-    /// states of its `reference.c`, and the amplification of errors.
-    const CASES: [(f64, f64, State, usize, f64); 2] = [
-        (
-            7.5e-3,
-            50.0 * (1.98357e-6 * 3.2e6),
-            [2.150556631719136e-3, 1.67506764044267e-1, -3.35849426803342e-2],
-            48,
-            10.0,
-        ),
-        (3.78e-3, 940.0, [1.148246712724051e-2, 2.3776288157839837, -2.4866011275185427], 50, 250.0),
-    ];
-
-    #[test]
-    fn reference_error_is_the_requested_error_times_the_amplification() {
-        for (k, t_end, end, expected, growth) in CASES {
-            for digits in 3..=13 {
-                let tolerance = libm::pow(10.0, -f64::from(digits));
-                let (state, rises, ..) = follow(k, t_end, tolerance);
-                let unit = [ScaledBlock { k, ..SLIDER }.force(), 1.0, 1.0];
-                let error = (0..3).map(|r| (state[r] - end[r]).abs() / unit[r]).fold(0.0, f64::max);
-                // Below 1e-12 rounding errors grow like those of steps.
-                assert!(error <= growth * tolerance.max(1e-12), "{k} at {tolerance:.0e}: {error:.1e}");
-                assert_eq!(rises, expected, "{k} at {tolerance:.0e}");
-            }
-        }
-    }
-
-    #[test]
-    fn step_counts_are_exact() {
-        let work = CASES.map(|(k, t_end, ..)| follow(k, t_end, 1e-6));
-        let [(.., paper, paper_implicit), (.., deep, deep_implicit)] = work;
-        assert_eq!(
-            (paper, paper_implicit),
-            (373, IntegratorStats { steps: 14, rejected: 0, evaluations: 51, factorisations: 15 })
-        );
-        assert_eq!(
-            (deep, deep_implicit),
-            (1211, IntegratorStats { steps: 656, rejected: 51, evaluations: 2369, factorisations: 707 })
-        );
+        of_step!(self, step => step.slope(r, u))
     }
 }

@@ -22,7 +22,7 @@ pub(super) const MAX_STEPS: u32 = 100_000;
 
 /// Error of a step, fraction of the error of a run, and distance from the limit cycle, fraction of `rtol`. Chosen: the errors of the thirty-odd steps of
 /// a slip add up.
-const STEP_ERROR: f64 = 0.03;
+pub(super) const STEP_ERROR: f64 = 0.03;
 
 /// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
 const DENSE_OUTPUT_ERROR: f64 = 1e-2;

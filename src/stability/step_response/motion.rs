@@ -1,18 +1,16 @@
 //! A response over time.
 
 use super::integration::{IntegrationStep, step_to};
+use super::long_term::STEP_ERROR;
 use super::scaled_block::{State, X, Y};
 use super::{ScaledStep, VelocityStep};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
-use crate::numerics::gauss;
+use crate::numerics::gauss::{SHORT_NODES, rule};
 use crate::protocol::{Moment, Motion, equal_landmarks, interval_at};
 
 /// Intervals of a traced response, at most. Chosen: a limit of memory, far beyond the resolution of a picture.
 const MAX_INTERVALS: usize = 1 << 18;
-
-/// Gauss nodes for the work of one interval. Chosen: their order is that of a step, 16.
-const NODES: usize = 8;
 
 /// The response to a step, up to some time.
 #[derive(Debug, Clone)]
@@ -44,14 +42,14 @@ impl MotionInterval {
 }
 
 impl VelocityStep {
-    /// Response up to the time `t_f`, in `l/v_0`, with errors of a step below `0.03 rtol`.
+    /// Response up to the time `t_f`, in `l/v_0`, with errors of a step below `STEP_ERROR rtol`.
     ///
     /// `None` for a rigid spring, for `v_i = v_f`, where the velocity becomes infinite, and for too many oscillations.
     pub fn motion(&self, t_f: f64, rtol: f64) -> Option<StepResponseMotion> {
         let Transition { law, v_f, .. } = self.transition;
         let ScaledStep { slider, ratio } = self.scaled()?;
         let start = slider.steady(ln(ratio));
-        let mut run = slider.run(start, slider.first_step(&start), 0.03 * rtol);
+        let mut run = slider.run(start, slider.first_step(&start), STEP_ERROR * rtol);
         let mut intervals = Vec::new();
         let end = t_f * v_f;
         while run.t() < end {
@@ -59,7 +57,7 @@ impl VelocityStep {
                 intervals.push(MotionInterval::Arrest { t: run.t(), from: *run.y(), to: arrested });
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            intervals.push(MotionInterval::Integrated(step_to(&mut run, end).ok()?));
+            intervals.push(MotionInterval::Integrated(step_to(&mut run, end)?));
             if intervals.len() > MAX_INTERVALS {
                 return None;
             }
@@ -71,7 +69,7 @@ impl VelocityStep {
 impl StepResponseMotion {
     /// Work of friction up to the end, `int tau v dt`, in scaled units.
     pub fn work(&self) -> f64 {
-        let rule = gauss::rule(NODES);
+        let rule = rule(SHORT_NODES);
         let step_work = |step: &IntegrationStep| {
             let at = |x: f64| self.moment(MotionInterval::Integrated(*step).at(0.5 * (1.0 + x)));
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
@@ -86,7 +84,7 @@ impl StepResponseMotion {
 
     /// Least velocity at the nodes and the ends of all intervals, in `v_0`.
     pub fn least_velocity(&self) -> f64 {
-        let rule = gauss::rule(NODES);
+        let rule = rule(SHORT_NODES);
         let fractions = || rule.x.iter().map(|x| 0.5 * (1.0 + x)).chain([0.0, 1.0]);
         let least = |interval: &MotionInterval| {
             fractions().map(|u| self.moment(interval.at(u)).v).fold(f64::INFINITY, f64::min)

@@ -161,7 +161,7 @@ impl<'a> Orbit<'a> {
             if self.slider.diverges(self.run.y()) {
                 return Err(StopReason::Divergence);
             }
-            let step = step_to(&mut self.run, f64::MAX).map_err(|_| StopReason::BlowUp)?;
+            let step = step_to(&mut self.run, f64::MAX).ok_or(StopReason::BlowUp)?;
             self.scan(&step);
             self.elapsed += step.h();
         }

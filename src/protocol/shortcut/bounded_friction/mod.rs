@@ -30,10 +30,10 @@ mod work_and_velocity;
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::{Transition, friction_margin};
-use crate::numerics::adaptive::integrals;
 use crate::numerics::elementary::{exp, exp_m1, ln_1p, ln_near_1};
 use crate::numerics::root::{Probe, newton};
 use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
+use crate::protocol::optimal::acceleration_time_at_ceiling;
 use crate::protocol::{Motion, SolverStats};
 use motion::BoundedFrictionMotion;
 use panel::FrictionPanel;
@@ -127,8 +127,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     let accelerates = v_f > v_i;
     let spare = t_f
         - if accelerates {
-            acceleration_time_at_ceiling(law.a, v_i, -log_ratio, (margin_i, margin_f), stats)
-                .ok_or(Obstacle::NotConverged)?
+            acceleration_time_at_ceiling(&case.transition, case.tau_ceiling).ok_or(Obstacle::Friction)?
         } else {
             (v_i - v_f) / v_i * (1.0 / v_f)
         };
@@ -174,9 +173,6 @@ fn paths(by_theta: FrictionPath, case: &Case, spare: f64, log_ratio: f64) -> Vec
     }
     order
 }
-
-/// Relative change of some velocity in the last step, at most. Chosen; the budgets of `shortcut` judge it.
-const MAX_LAST_CHANGE: f64 = 1e-3;
 
 /// Tolerance at the nodes of the last pass, in units of `rtol`. Chosen: the rest is left for the other errors of the row.
 const LAST_PASS_FRACTION: f64 = 0.1;
@@ -232,7 +228,7 @@ fn refine(
         }
         if is_last && (within(0.5 * rtol) || spent) {
             // Where this residual depends on alpha by rounding only, it fails.
-            return within(MAX_LAST_CHANGE).then_some((path, panels));
+            return within(NEWTON_CHANGE).then_some((path, panels));
         }
         if !step.is_finite() || is_last && are_neighbours {
             return None;
@@ -252,32 +248,12 @@ fn refine(
     None
 }
 
-/// Time of an acceleration with `tau = tau_M` throughout, `int e^y/(e^z - 1) dy` over `y = ln theta`, in `l/v_0`; `None` where the quadrature fails.
-///
-/// `z = ln(theta v)` is linear in `y`, from `margin_i/a` to `margin_f/a`. Panels are halved towards the end that is nearer to the
-/// pole at `z = 0`.
-fn acceleration_time_at_ceiling(
-    a: f64,
-    v_i: f64,
-    span: f64,
-    (margin_i, margin_f): (f64, f64),
-    stats: &mut SolverStats,
-) -> Option<f64> {
-    let (z_i, z_f) = (margin_i / a, margin_f / a);
-    let rate = |s: f64| {
-        let (fallen, z) = if z_i < z_f { (s, z_i + s * (z_f - z_i)) } else { (1.0 - s, z_f + s * (z_i - z_f)) };
-        Some([span * exp(-fallen * span) / v_i / exp_m1(z)])
-    };
-    let ([time], nodes) = integrals(rate, vec![(0.0, 1.0)], &[0.0])?;
-    *stats += SolverStats { quadratures: 1, nodes };
-    Some(time)
-}
-
 /// Tolerance of the passes of the search. Chosen; the budgets of `shortcut` judge it.
 const SEARCH_TOLERANCE: f64 = 1e-4;
 
-/// Relative change of `alpha_3` that ends the search. Chosen: from three digits Newton's method takes two or three passes.
-const SEARCH_RTOL: f64 = 1e-3;
+/// Relative change of `alpha_3` that ends the search, and of some velocity in the last step, at most. Chosen: from three digits Newton's method takes
+/// two or three passes.
+const NEWTON_CHANGE: f64 = 1e-3;
 
 /// Weight of a relative error of 1 of theta at the end, in the step that ends the search. Chosen; the budgets of `shortcut` judge it.
 const RESIDUAL_WEIGHT: f64 = 0.1;
@@ -321,7 +297,7 @@ fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Opti
         }
         // A step that is small compared with alpha may still pass the point where theta falls to 0. Theta may arrive almost
         // independently of alpha: the growth of errors vanishes beyond.
-        let most = if errors > max_growth { 2.0 * SEARCH_RTOL } else { RESIDUAL_WEIGHT * value.abs() / path.size };
+        let most = if errors > max_growth { 2.0 * NEWTON_CHANGE } else { RESIDUAL_WEIGHT * value.abs() / path.size };
         let weight = (1.0 / scale).max(most / step.abs());
         Some(Probe { value: -step * weight, slope: weight })
     };
@@ -331,6 +307,6 @@ fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Opti
         Residual::Slip | Residual::TwoSidedSlip => (far, MAX_ASINH_ALPHA),
         Residual::TimeLoss => (-far, MAX_ASINH_ALPHA),
     };
-    let root = newton(probe, start, (-most, most), false, SEARCH_RTOL)?;
+    let root = newton(probe, start, (-most, most), false, NEWTON_CHANGE)?;
     (!gave_up && errors <= max_growth).then(|| alpha_at(root.x))
 }

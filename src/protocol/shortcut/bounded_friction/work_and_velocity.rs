@@ -3,8 +3,9 @@
 use super::panel::FrictionPanel;
 use super::path::{FrictionPath, PathEnd};
 use crate::model::Transition;
+use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::numerics::radau::{NODES, radau};
-use crate::protocol::control::ValueRange;
+use crate::protocol::control::{Tolerance, ValueRange};
 
 /// Work and range of the velocity.
 #[derive(Debug, Clone, Copy)]
@@ -34,50 +35,31 @@ impl WorkAndVelocity {
     /// Adds one panel.
     fn add(&mut self, path: &FrictionPath, panel: &FrictionPanel) {
         let rule = radau();
-        let (mut before, mut sum) = (0.0, 0.0);
-        let (_, z) = panel.state(path, 0.0);
-        let mut bend_before = path.ln_v_slope(panel.side, panel.from, panel.start, z);
+        let length = (panel.to - panel.from).abs();
+        let at =
+            |d: f64, w: f64, z: f64| [path.velocity(panel.side, w, z), length * path.ln_v_slope(panel.side, d, w, z)];
+        let at_fraction = |u: f64| {
+            let (w, z) = panel.state(path, u);
+            at(panel.distance(u), w, z)
+        };
+        let (mut before, mut sum) = ((0.0, at_fraction(0.0)), 0.0);
         // An extremum may lie between two panels, where theta begins to follow the velocity.
         if panel.side == PathEnd::Start && panel.from == 0.0 {
             self.last = None;
         }
-        if let Some((_, v)) = self.last.filter(|&(rises, _)| rises != (bend_before > 0.0)) {
+        if let Some((_, v)) = self.last.filter(|&(rises, _)| rises != (before.1[1] > 0.0)) {
             self.v.add(v);
         }
         for j in 0..NODES {
             let (d, w, z) = (panel.distance(rule.u[j]), panel.w[j], panel.z[j]);
             sum += rule.w[j] * path.friction(panel.side, d) * path.velocity(panel.side, w, z);
-            let ln_v_slope = path.ln_v_slope(panel.side, d, w, z);
-            if (ln_v_slope > 0.0) != (bend_before > 0.0) {
-                self.add_extremum(path, panel, (before, rule.u[j]), bend_before > 0.0);
+            let after = (rule.u[j], at(d, w, z));
+            if (after.1[1] > 0.0) != (before.1[1] > 0.0) {
+                self.v.add_interval(before, after, Tolerance::OfValue(LONG_ROUNDING_RTOL), &at_fraction);
             }
-            (before, bend_before) = (rule.u[j], ln_v_slope);
+            before = after;
         }
-        self.last = Some((bend_before > 0.0, path.velocity(panel.side, panel.w[NODES - 1], panel.z[NODES - 1])));
-        self.work += path.t_f * (panel.to - panel.from).abs() * sum;
-    }
-
-    /// Adds the extremum between two fractions of a panel, by bisection.
-    fn add_extremum(
-        &mut self,
-        path: &FrictionPath,
-        panel: &FrictionPanel,
-        (mut low, mut high): (f64, f64),
-        rising: bool,
-    ) {
-        for _ in 0..MAX_HALVINGS {
-            let middle = 0.5 * (low + high);
-            let (w, z) = panel.state(path, middle);
-            if (path.ln_v_slope(panel.side, panel.distance(middle), w, z) > 0.0) == rising {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        let (w, z) = panel.state(path, low);
-        self.v.add(path.velocity(panel.side, w, z));
+        self.last = Some((before.1[1] > 0.0, before.1[0]));
+        self.work += path.t_f * length * sum;
     }
 }
-
-/// Bisections for an extremum. Derived: the error of its value is quadratic in the width of the bracket.
-const MAX_HALVINGS: u32 = 28;
