@@ -137,11 +137,15 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     let order = paths(by_theta, case, spare, log_ratio);
     // Rounding of the time, at the greater velocity.
     let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
-    let rounds = [(LOW_NOISE.max(rtol), MAX_ERROR_GROWTH), (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY)];
-    for (max_noise, max_growth) in rounds {
+    let low_noise = LOW_NOISE.max(rtol);
+    let rounds = [
+        (low_noise, MAX_ERROR_GROWTH, 0.5 * low_noise),
+        (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY, NEWTON_CHANGE),
+    ];
+    for (max_noise, max_growth, last_step) in rounds {
         for path in &order {
-            let found =
-                search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), (rtol, max_noise), stats));
+            let limits = (rtol, max_noise, last_step);
+            let found = search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), limits, stats));
             if let Some(found) = found {
                 return Ok(found);
             }
@@ -196,10 +200,10 @@ fn last_pass(
     path.pass(tolerance.min(inside), Some(WorkTolerance { accuracy, expected }), stats)
 }
 
-/// Refines a path to the one that arrives, with its panels; `None` where this fails.
+/// Refines a path to the one that arrives, with its panels; `None` where this fails, or where rounding leaves more than `last_step`.
 fn refine(
     mut path: FrictionPath,
-    (rtol, max_noise): (f64, f64),
+    (rtol, max_noise, last_step): (f64, f64, f64),
     stats: &mut SolverStats,
 ) -> Option<(FrictionPath, Vec<FrictionPanel>)> {
     let (mut is_last, mut before, mut tolerance, mut expected) = (false, f64::INFINITY, 0.1 * rtol, 0.0);
@@ -228,7 +232,7 @@ fn refine(
         }
         if is_last && (within(0.5 * rtol) || spent) {
             // Where this residual depends on alpha by rounding only, it fails.
-            return within(NEWTON_CHANGE).then_some((path, panels));
+            return within(last_step).then_some((path, panels));
         }
         if !step.is_finite() || is_last && are_neighbours {
             return None;
