@@ -23,7 +23,7 @@ pub struct SpecError {
     /// The help.
     pub help: Box<str>,
     /// The other faults, at most nine.
-    pub others: Vec<SpecError>,
+    pub others: Box<[SpecError]>,
 }
 
 /// Greatest number of faults in an error. Chosen: they fit a screen.
@@ -47,7 +47,7 @@ impl SpecError {
             found: found.into(),
             expected: expected.into(),
             help: help.into(),
-            others: Vec::new(),
+            others: Box::default(),
         }
     }
 
@@ -65,8 +65,8 @@ impl SpecError {
     pub fn and(faults: Option<SpecError>, mut other: SpecError) -> SpecError {
         let Some(mut first) = faults else { return other };
         let others = mem::take(&mut other.others);
-        first.others.extend(iter::once(other).chain(others));
-        first.others.truncate(MAX_FAULTS - 1);
+        let known = Vec::from(mem::take(&mut first.others));
+        first.others = known.into_iter().chain([other]).chain(others).take(MAX_FAULTS - 1).collect();
         first
     }
 
