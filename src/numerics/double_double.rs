@@ -35,11 +35,6 @@ impl DoubleDouble {
         DoubleDouble { high, low: ((x1 * y1 - high) + x1 * y2 + x2 * y1) + x2 * y2 }
     }
 
-    /// Times a power of 2, exactly.
-    pub fn scaled(self, power: f64) -> Self {
-        DoubleDouble { high: power * self.high, low: power * self.low }
-    }
-
     /// The square root of a number that is not negative.
     pub fn sqrt(self) -> Self {
         let root = Self::new(self.high.sqrt());
