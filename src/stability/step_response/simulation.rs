@@ -52,6 +52,8 @@ pub struct Simulation {
 /// leaves the band of settled velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct UnresolvedNumbers {
+    /// The greatest velocity: it is only known that the response settles.
+    pub peak: bool,
     /// The least velocity.
     pub trough: bool,
     /// The least velocity on the limit cycle.
@@ -84,8 +86,8 @@ pub(super) fn follow(slider: &ScaledBlock, x: f64, rtol: f64) -> Simulation {
     let settles = settles(slider, linear, x);
     let simulation = simulate(slider, linear, x, rtol, settles);
     if settles && simulation.long_term == LongTermBehaviour::Undecided {
-        // Its numbers are unknown.
-        return Simulation { long_term: LongTermBehaviour::Settled { time: f64::NAN }, ..simulation };
+        let unresolved = UnresolvedNumbers { peak: true, trough: true, t_peak: true, ..simulation.unresolved };
+        return Simulation { long_term: LongTermBehaviour::Settled { time: f64::NAN }, unresolved, ..simulation };
     }
     simulation
 }
