@@ -1,4 +1,4 @@
-//! Opens plain files that a user names. Named pipes, which wait for a writer, and devices, which may never end, are refused.
+//! Plain files that a user names. Named pipes, which wait for a writer, and devices, which may never end, are refused.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -16,6 +16,26 @@ pub fn open(path: &Path) -> io::Result<File> {
     }
     let found = if kind.is_dir() { "a folder, not a file" } else { "a device or a named pipe, not a file" };
     Err(io::Error::new(io::ErrorKind::InvalidInput, found))
+}
+
+/// The folder of a path; of a bare name, the current one.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The text of a file.
+///
+/// # Errors
+///
+/// [`io::ErrorKind::InvalidData`] with the first line that is not UTF-8, and errors of reading.
+pub fn text(mut file: impl Read) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|&&byte| byte == b'\n').count();
+        io::Error::new(io::ErrorKind::InvalidData, format!("line {line} is not UTF-8"))
+    })
 }
 
 /// The bytes of the file in `path`.

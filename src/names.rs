@@ -42,7 +42,8 @@ fn is_control(c: char) -> bool {
 }
 
 /// Names of our quantities and columns in other tools, in lower case.
-const SYNONYMS: [(&str, &[&str]); 10] = [
+const SYNONYMS: [(&str, &[&str]); 11] = [
+    ("threads", &["jobs", "j", "cores"]),
     ("where", &["filter", "condition"]),
     ("rtol", &["tol", "tolerance", "accuracy", "precision"]),
     ("l", &["d_c", "dc", "d_rs", "length"]),

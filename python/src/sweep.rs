@@ -18,9 +18,9 @@ use crate::threads::{self, interruptible, stopper};
 #[pyclass(frozen, module = "slipsweep._core")]
 pub struct Sweep(Arc<sweep::Sweep>);
 
-/// A fault of a spec that no file holds: its line is not one of anything that the caller wrote.
+/// Faults of a spec that no file holds: their lines are not those of anything that the caller wrote.
 fn without_line(fault: SpecError) -> SpecError {
-    SpecError { line: None, ..fault }
+    fault.each(|fault| fault.line = None)
 }
 
 #[pymethods]

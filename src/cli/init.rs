@@ -69,6 +69,10 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
         let place = if name == given.to_string() { String::new() } else { format!("`{given}`: ") };
         refused(format!("{place}{}", error.found), error.expected, error.help)
     })?;
+    if !(folder.as_os_str().is_empty() || folder.is_dir()) {
+        let found = format!("`{given}`: there is no folder `{}`", folder.display());
+        return Err(refused(found, "a name, or a path in an existing folder", format!("slipsweep init {name}")));
+    }
     let text = format!("#:schema ./{SCHEMA}\n{}", arguments.question.spec().replace("NAME", &name));
     let path = folder.join(format!("{name}.toml"));
     let has = |path: &Path, text: &str| file::open(path).and_then(io::read_to_string).is_ok_and(|found| found == text);

@@ -1,15 +1,16 @@
 //! The kind of a path. If an argument has the wrong kind, the message names the command that accepts it.
 
+use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Failure, refused};
-use crate::dataset::{Folder, frame};
+use crate::dataset::{Folder, MANIFEST, frame};
 use crate::file;
 use crate::sweep::path_hint;
 
-/// The file that makes a folder a dataset.
-pub const MANIFEST: &str = "manifest.json";
+/// Greatest number of datasets that a message lists. Chosen: they fit on a line.
+const MAX_NAMED_DATASETS: usize = 4;
 
 /// The kind of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +28,7 @@ pub enum Kind {
 impl Kind {
     /// The kind of `path`.
     pub fn of(path: &Path) -> Kind {
-        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+        let ending = ending(path);
         let has_columns_of_trace = || {
             let columns = columns(path, &ending);
             ["t", "v"].iter().all(|name| columns.iter().any(|column| column == name))
@@ -50,6 +51,11 @@ impl Kind {
             Kind::Other => "another file",
         }
     }
+}
+
+/// The ending of the name of a file, in lower case.
+fn ending(path: &Path) -> String {
+    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase()
 }
 
 /// Whether a folder is a dataset: it has a manifest, or parts, which replace a lost one.
@@ -86,16 +92,41 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
         Kind::Dataset => ("a dataset".to_owned(), format!("`slipsweep summary {shown}` shows its contents")),
         Kind::Spec => ("a spec".to_owned(), format!("`slipsweep run {shown}` computes its dataset; name that folder")),
         Kind::Trace => ("a trace".to_owned(), format!("`slipsweep plot {shown}` draws it")),
-        Kind::Other => {
-            let found = match file::open(path) {
-                Err(error) if !path.is_dir() => error.to_string(),
-                _ => "a file or folder of another kind".to_owned(),
-            };
-            (found, "name a folder that `slipsweep run` wrote".to_owned())
-        }
+        Kind::Other => other(path),
     };
     let expected: Vec<&str> = kinds.iter().map(|kind| kind.words()).collect();
     refused(format!("{shown}: {found}"), expected.join(", or "), help)
+}
+
+/// A path of another kind in words, and the help for it.
+fn other(path: &Path) -> (String, String) {
+    let shown = path.display();
+    if let Some(dataset) = path.ancestors().skip(1).take(2).find(|above| above.join(MANIFEST).is_file()) {
+        let dataset = if dataset == Path::new("") { Path::new(".") } else { dataset };
+        return ("a piece of a dataset".to_owned(), format!("name the dataset, {}", dataset.display()));
+    }
+    let is_ours = "name a folder that `slipsweep run` wrote".to_owned();
+    if path.is_dir() {
+        let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+        let mut datasets: Vec<PathBuf> = entries.filter(|folder| folder.join(MANIFEST).is_file()).collect();
+        datasets.sort();
+        let names: Vec<String> =
+            datasets.iter().take(MAX_NAMED_DATASETS).map(|path| path.display().to_string()).collect();
+        return match names.is_empty() {
+            true => ("a folder without a dataset".to_owned(), is_ours),
+            false => ("a folder of datasets".to_owned(), format!("name one of them: {}", names.join(", "))),
+        };
+    }
+    match (file::open(path), ending(path).as_str()) {
+        (Err(error), _) => (error.to_string(), is_ours),
+        (_, "csv" | "parquet") => {
+            ("a file of rows".to_owned(), format!("`slipsweep head {shown}` shows it, and `slipsweep query` reads it"))
+        }
+        (_, "html" | "htm" | "svg" | "png" | "pdf") => {
+            ("a page or a picture".to_owned(), "open it in a browser or a viewer".to_owned())
+        }
+        _ => ("a file of another kind".to_owned(), is_ours),
+    }
 }
 
 /// Checks that `path` may be a spec; the reader of specs reports other errors.
@@ -104,7 +135,13 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
 ///
 /// What the path is instead.
 pub fn expect_spec(path: &Path) -> Result<(), Failure> {
-    if matches!(Kind::of(path), Kind::Spec | Kind::Other) { Ok(()) } else { Err(unexpected(path, &[Kind::Spec])) }
+    let is_file_of_another_kind =
+        || matches!(ending(path).as_str(), "csv" | "parquet" | "json" | "html" | "htm" | "svg" | "png" | "pdf");
+    match Kind::of(path) {
+        Kind::Spec => Ok(()),
+        Kind::Other if !(path.is_file() && is_file_of_another_kind()) => Ok(()),
+        _ => Err(unexpected(path, &[Kind::Spec])),
+    }
 }
 
 /// Checks that `path` may contain rows; the readers of datasets and of files report other errors.

@@ -36,16 +36,18 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use self::watch::waiting;
-use crate::dataset::{Folder, Manifest, atomic};
-use crate::names::hint;
+use crate::dataset::{Folder, MANIFEST, Manifest, atomic};
+use crate::file::folder_of;
+use crate::names::{hint, nearest};
 #[cfg(feature = "query")]
 use crate::query::QueryError;
 use crate::sweep::{SpecError, Sweep, schema};
 
-use kind::{Kind, MANIFEST};
+use kind::Kind;
 
 /// Exit code if the spec or the arguments are wrong.
 const EXIT_REQUEST: u8 = 1;
@@ -172,13 +174,15 @@ pub fn main(stdout_is_closed: bool) -> ExitCode {
 /// Runs the command of the arguments of a process, the first of which is its name. Returns the exit code.
 pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool) -> u8 {
     STDOUT_IS_CLOSED.store(stdout_is_closed, Ordering::Relaxed);
-    report_first_panic();
+    hide_guarded_panics();
     // Without this signal, a file that exceeds the user's limit fails to write instead of ending the process.
     #[cfg(unix)]
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let words: Vec<OsString> = arguments.collect();
+    let arguments = match Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => {
+            let error = suggested(error, &words);
             let printed = error.print();
             if error.use_stderr() {
                 // A lost terminal is ignored.
@@ -188,6 +192,27 @@ pub fn main_of(arguments: impl Iterator<Item = OsString>, stdout_is_closed: bool
         }
     };
     ended(perform(arguments))
+}
+
+/// The error of an unknown option among `words` with the option that was probably meant.
+fn suggested(mut error: clap::Error, words: &[OsString]) -> clap::Error {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return error };
+    if error.kind() != ErrorKind::UnknownArgument {
+        return error;
+    }
+    let plain = |option: &str| option.trim_start_matches('-').replace('-', "");
+    let given = plain(given);
+    let program = Arguments::command();
+    let command = words.iter().skip(1).find_map(|word| program.find_subcommand(word)).unwrap_or(&program);
+    let options: Vec<&str> = command.get_arguments().filter_map(clap::Arg::get_long).collect();
+    let spelt: Vec<String> = options.iter().map(|option| plain(option)).collect();
+    let meant = nearest(&given, spelt.iter().map(String::as_str));
+    error.remove(ContextKind::SuggestedArg);
+    error.remove(ContextKind::Suggested);
+    if let Some(place) = spelt.iter().position(|option| Some(option.as_str()) == meant) {
+        error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{}", options[place])));
+    }
+    error
 }
 
 /// Writes a file completely or not at all, unless it belongs to a dataset.
@@ -202,15 +227,10 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     Failure::failed(format!("{}: cannot write: {error}\n  help: {help}", path.display()))
 }
 
-/// The folder of a path; of a bare name, the current one.
-fn parent(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Refuses to replace a part or the manifest of a dataset.
 fn keep_datasets(out: &Path) -> Result<(), Failure> {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    let folder = fs::canonicalize(parent(&real)).unwrap_or_else(|_| parent(&real).to_owned());
+    let folder = fs::canonicalize(folder_of(&real)).unwrap_or_else(|_| folder_of(&real).to_owned());
     let is_manifest = real.file_name().is_some_and(|name| name == MANIFEST) && kind::is_dataset(&folder);
     if is_manifest || folder.parent().is_some_and(kind::is_dataset) {
         let what = "a file of a dataset, which only `slipsweep run` writes";
@@ -314,10 +334,9 @@ pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
 /// Prints a note if the manifest of the dataset in `path` was reconstructed from the parts.
 fn note_rebuilt(path: &Path) {
     let Ok(Some(Manifest { rebuilt: Some(why), .. })) = Folder::at(path).manifest() else { return };
-    let manifest = path.join(MANIFEST);
     note(format!(
         "{} is {why}; rebuilt from the footers of the parts; `slipsweep run` rewrites it",
-        manifest.display()
+        Folder::at(path).manifest_path().display()
     ));
 }
 
@@ -326,12 +345,11 @@ fn note(text: impl Display) {
     let _ = writeln!(io::stderr(), "note: {text}");
 }
 
-/// Reports only the first panic of the process: the engine provokes others while it searches for the faulty row. Panics of a reader of damaged
-/// files are reported as errors of the file.
-fn report_first_panic() {
-    let (usual, known) = (panic::take_hook(), AtomicBool::new(false));
+/// Prints no message for panics of a reader of damaged files, which become errors of the file.
+fn hide_guarded_panics() {
+    let usual = panic::take_hook();
     panic::set_hook(Box::new(move |panic| {
-        if !crate::dataset::is_guarded() && !known.swap(true, Ordering::Relaxed) {
+        if !crate::dataset::is_guarded() {
             usual(panic);
         }
     }));

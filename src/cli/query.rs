@@ -5,25 +5,28 @@
 
 use std::env;
 use std::fs;
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufWriter, IsTerminal, Read, Write};
 use std::mem;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, SystemTime};
 
 use clap::ValueEnum;
+use indicatif::ProgressBar;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output::{self, Output};
+use super::watch;
 use super::{
-    Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, parent, say, stdout, summary, to_file, words,
-    written, wrong,
+    Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, say, stdout, summary, to_file, words, written,
+    wrong,
 };
-use crate::dataset::atomic;
+use crate::dataset::{Folder, atomic};
+use crate::file::folder_of;
 use crate::query::{self, Answer, AnswerError, Comparisons, Tables};
 #[cfg(target_os = "linux")]
 use crate::sweep::available_bytes;
@@ -114,20 +117,33 @@ fn apart(arguments: &Arguments) -> Result<(), Failure> {
     let program = env::current_exe().map_err(no_process)?;
     let mut command = Command::new(program);
     command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
+    let bar = watch::spinner("answering the query");
+    // On a terminal the answer goes through this process, which removes the progress line first.
+    let is_terminal = io::stdout().is_terminal();
+    if is_terminal {
+        command.stdout(Stdio::piped());
+    }
     let mut child = command.spawn().map_err(no_process)?;
-    let mut said = child.stderr.take();
+    let (answer, mut said, line) = (child.stdout.take(), child.stderr.take(), bar.clone());
+    let pass = move || answer.map_or((), |answer| pass_on(answer, &line));
     let listen = move || said.as_mut().and_then(|said| io::read_to_string(said).ok()).unwrap_or_default();
-    let listener = thread::Builder::new().spawn(listen).map_err(|error| {
+    let threads =
+        thread::Builder::new().spawn(pass).and_then(|passer| Ok((passer, thread::Builder::new().spawn(listen)?)));
+    let (passer, listener) = threads.map_err(|error| {
         let _ = child.kill();
         let _ = child.wait();
         no_process(error)
     })?;
-    let ended = wait(&mut child, &signal);
+    let ended = wait(&mut child, &signal, &bar);
+    bar.finish_and_clear();
+    // A panic there leaves the answer incomplete, like a reader that has had enough.
+    let _ = passer.join();
     let text = listener.join().unwrap_or_default();
     let number = signal.load(Ordering::Relaxed);
     if number != 0 {
         sweep(&arguments.output.out);
-        return Err(Failure { code: u8::try_from(128 + number).unwrap_or(u8::MAX), message: "stopped".to_owned() });
+        let message = "stopped while answering the query; nothing has changed".to_owned();
+        return Err(Failure { code: u8::try_from(128 + number).unwrap_or(u8::MAX), message });
     }
     let status = ended.map_err(Failure::failed)?;
     match status.code() {
@@ -148,8 +164,20 @@ fn cannot_start(what: &str, error: io::Error) -> Failure {
     Failure::failed(format!("cannot start {what}: {error}\n  help: {help}"))
 }
 
+/// Copies the answer of the query process to standard output, without the progress line. An answer that nobody reads is no failure.
+fn pass_on(mut answer: ChildStdout, bar: &ProgressBar) {
+    let mut bytes = [0; 1 << 13];
+    while let Ok(length @ 1..) = answer.read(&mut bytes) {
+        bar.finish_and_clear();
+        let mut out = io::stdout();
+        if out.write_all(&bytes[..length]).and_then(|()| out.flush()).is_err() {
+            break;
+        }
+    }
+}
+
 /// Waits for the end of a process, or ends it after a signal.
-fn wait(child: &mut Child, signal: &AtomicUsize) -> io::Result<ExitStatus> {
+fn wait(child: &mut Child, signal: &AtomicUsize, bar: &ProgressBar) -> io::Result<ExitStatus> {
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(status);
@@ -157,6 +185,9 @@ fn wait(child: &mut Child, signal: &AtomicUsize) -> io::Result<ExitStatus> {
         if signal.load(Ordering::Relaxed) != 0 {
             child.kill()?;
             return child.wait();
+        }
+        if bar.elapsed() > watch::PROGRESS_DELAY && !bar.is_finished() {
+            bar.tick();
         }
         thread::sleep(POLL_INTERVAL);
     }
@@ -183,7 +214,7 @@ fn reason(status: ExitStatus, said: &str) -> String {
 /// Removes the temporary files that an ended process left for `out`.
 fn sweep(out: &Path) {
     let real = fs::canonicalize(out).unwrap_or_else(|_| out.to_owned());
-    atomic::sweep(parent(&real), SystemTime::now());
+    atomic::sweep(folder_of(&real), SystemTime::now());
 }
 
 /// Answers a query in this process, which ends after its answer, or when the process that started it ends.
@@ -284,7 +315,7 @@ fn failure(tables: &Tables, arguments: &Arguments, error: AnswerError) -> Failur
 /// The failure for tables that cannot be read to the end, usually because of a damaged file.
 pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     let path = dataset.display();
-    let help = if dataset.join("manifest.json").exists() {
+    let help = if Folder::at(dataset).manifest_path().exists() {
         format!("`slipsweep status {path} --check` names damaged files, and the next run recomputes them")
     } else {
         "write the file again".to_owned()

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::summary::SummaryBlock;
 use super::watch::waiting;
 use super::{Failure, dataset, keep_datasets, plan, refused, say, summary, words, write_file};
-use crate::dataset::TableSurvey;
+use crate::dataset::{Folder, TableSurvey};
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
 use crate::protocol::Status;
@@ -118,7 +118,7 @@ fn summaries(page: &mut Page, tables: &[TableSurvey]) {
 /// The plan of the spec of the dataset in `folder`.
 fn plan_of(page: &mut Page, spec: &str, folder: &Path) -> Result<(), Failure> {
     page.heading("Plan");
-    match Sweep::parse_at(spec, &folder.join("manifest.json")) {
+    match Sweep::parse_at(spec, &Folder::at(folder).manifest_path()) {
         Ok(sweep) => {
             let estimates = waiting("computing a sample", || estimate(&sweep, folder)).map_err(Failure::failed)?;
             page.verbatim(&plan::in_words(&sweep, &estimates, 0.0));

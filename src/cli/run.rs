@@ -10,10 +10,11 @@ use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{waiting, watched};
 use super::{
-    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, parent, refused, say, summary, whole, words, wrong,
+    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, refused, say, summary, whole, words, wrong,
 };
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
+use crate::file::folder_of;
 use crate::protocol::Status;
 use crate::sweep::{self, Outcome, Plan, RunError, Shard, Sweep, contains_part};
 use crate::table::Signal;
@@ -195,8 +196,8 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
         let message = "the manifest is missing, and the parts do not contain the spec";
         return Err(wrong(format!("{}: {message}\n  help: run the spec file of this dataset", path.display())));
     }
-    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).map_err(|error| {
-        let out = parent(path).display();
+    let sweep = Sweep::parse_at(&manifest.spec, &Folder::at(path).manifest_path()).map_err(|error| {
+        let out = folder_of(path).display();
         let what = format!("{}: its spec refers to files that are not in the dataset", path.display());
         let help = format!("run the spec file: slipsweep run SPEC --out {out}");
         wrong(format!("{what}\n  found: {error}\n  help: {help}"))

@@ -7,7 +7,8 @@ use std::process::Command;
 
 use clap::ValueEnum;
 
-use super::{Failure, cannot_write, load, say, to_file, whole, within, words, wrong};
+use super::watch::waiting;
+use super::{Failure, cannot_write, load, refused, say, to_file, whole, within, words, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -102,7 +103,8 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let sweep = load(&arguments.spec)?;
     let plan = Plan::new(&sweep);
     check_parts(&plan).map_err(wrong)?;
-    let seconds = estimate(&sweep, &arguments.out).map_err(Failure::failed)?.seconds();
+    let sample = waiting("computing a sample", || estimate(&sweep, &arguments.out));
+    let seconds = sample.map_err(Failure::failed)?.seconds();
     let parts: u64 = plan.tables.iter().map(|table| table.parts).sum();
     let rows = plan.tables.iter().fold(0_u64, |sum, table| sum.saturating_add(table.rows));
 
@@ -111,6 +113,11 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let each = seconds / (shards * arguments.cpus) as f64;
 
     let out = absolute(&arguments.out)?;
+    // Slurm removes them from the path of a log.
+    if engine == Engine::Slurm && out.to_string_lossy().contains('\\') {
+        let found = format!("{}: Slurm writes no log below a folder whose name has a backslash", out.display());
+        return Err(refused(found, "a path without `\\`", "write elsewhere with --out DIR"));
+    }
     let folder = Folder::new(&out, &sweep.name);
     let script = engine.script(folder.path());
     fs::create_dir_all(&arguments.out).map_err(|error| cannot_write(&arguments.out, &error))?;

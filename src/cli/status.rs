@@ -3,9 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::kind::Kind;
 use super::shards::{quoted, scripts};
-use super::{EXIT_FAILURE, Failure, kind, parent, refused, say, summary, words};
+use super::{EXIT_FAILURE, Failure, kind, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey, TableSurvey};
+use crate::file::folder_of;
 use crate::sweep::{Plan, Sweep, shards_with};
 
 /// Arguments of `status`.
@@ -31,11 +33,12 @@ const MAX_LISTED: usize = 10;
 /// A path that is not a dataset, or damaged parts.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
-    kind::expect_rows(path)?;
+    if !path.is_dir() {
+        return Err(kind::unexpected(path, &[Kind::Dataset]));
+    }
     let folder = Folder::at(path);
     let Some(manifest) = folder.manifest().map_err(Failure::failed)? else {
-        let (found, help) = (format!("{}: not a dataset", path.display()), "name a folder that `slipsweep run` wrote");
-        return Err(refused(found, "a folder with a manifest.json or at least one part", help));
+        return Err(kind::unexpected(path, &[Kind::Dataset]));
     };
     let survey =
         summary::survey(&folder, &manifest, if arguments.check { CheckDepth::Whole } else { CheckDepth::Footer });
@@ -50,13 +53,9 @@ pub fn status(arguments: &Arguments) -> Result<(), Failure> {
         text.push_str(if arguments.check { "complete; all checksums match\n" } else { "complete\n" });
         return say(&text);
     }
-    let runs = folder.runs();
-    for run in &runs {
-        let what = if run.is_alone { "a run" } else { "a run of a shard" };
-        let _ = writeln!(text, "{what} is writing this dataset (process {})", run.process);
-    }
-    if !runs.iter().any(|run| run.is_alone) {
-        text.push_str(&remedy(path, &manifest, &survey));
+    match folder.is_busy() {
+        true => text.push_str("a run is writing this dataset\n"),
+        false => text.push_str(&remedy(path, &manifest, &survey)),
     }
     say(&text)?;
     let (all, there) =
@@ -92,18 +91,15 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
     });
     let shown = |paths: &[PathBuf]| -> Vec<String> { paths.iter().map(|path| path.display().to_string()).collect() };
     let file = |table: &TableSurvey, part: u64| folder.part(&table.name, part).display().to_string();
-    let damaged = tables()
-        .flat_map(|table| table.damaged.iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))));
-    let foreign = tables().flat_map(|table| {
-        table.foreign.iter().map(move |(part, [what, expected, found])| {
-            let file = file(table, *part);
-            format!("{file}: belongs to another {what}\n    expected: {expected}\n    found: {found}")
-        })
-    });
+    let files = |of: fn(&TableSurvey) -> &[(u64, String)]| -> Vec<String> {
+        tables()
+            .flat_map(|table| of(table).iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))))
+            .collect()
+    };
     let lists: [(&str, Vec<String>); 5] = [
         ("missing parts:", missing.collect()),
-        ("damaged parts (the next run recomputes them):", damaged.collect()),
-        ("foreign files in the place of parts (a run leaves them alone and fails):", foreign.collect()),
+        ("damaged parts (the next run recomputes them):", files(|table| &table.damaged)),
+        ("foreign files in the place of parts (a run leaves them alone and fails):", files(|table| &table.foreign)),
         (
             "temporary files of running or killed processes (the next run removes those of killed ones):",
             shown(&survey.temporary),
@@ -140,11 +136,11 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
         let _ = writeln!(text, "  run its spec with {theirs}; this is {ours}, whose parts would differ");
         return text;
     }
-    let sweep = Sweep::parse_at(&manifest.spec, &path.join("manifest.json")).ok();
+    let sweep = Sweep::parse_at(&manifest.spec, &Folder::at(path).manifest_path()).ok();
     let plan = sweep.as_ref().map(Plan::new);
     let is_same = plan.as_ref().is_some_and(|plan| plan.tables == manifest.tables);
     let (Some(sweep), Some(plan), true) = (sweep, plan, is_same) else {
-        let out = quoted(parent(path));
+        let out = quoted(folder_of(path));
         let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
         text.push_str("SPEC is the spec file of this dataset: it refers to files that are not in the dataset\n");
         return text;

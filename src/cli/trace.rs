@@ -159,6 +159,7 @@ struct State {
 
 /// Reads `theta=0.3,t_left=0.015`.
 fn state(text: &str) -> Result<State, String> {
+    let text: String = text.split_whitespace().collect();
     let parts = text.strip_prefix("theta=").and_then(|rest| rest.split_once(",t_left="));
     let (theta, t_left) = parts.ok_or("expected theta=THETA,t_left=TIME")?;
     let [theta, t_left] = [(theta, Quantity::Theta), (t_left, Quantity::TimeLeft)]
@@ -228,7 +229,9 @@ fn legal(text: &str, domain: Domain) -> Result<f64, String> {
 
 /// A parser of a quantity.
 fn number(quantity: Quantity) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| legal(text, quantity.domain())
+    let unit = quantity.unit(Scale::Model);
+    let unit = if unit == "1" { String::new() } else { format!(", in units of {unit}") };
+    move |text| legal(text, quantity.domain()).map_err(|expected| expected + &unit)
 }
 
 /// The protocol to trace, from flags or from a row.
@@ -695,7 +698,8 @@ impl Effects {
         let change = words::number(100.0 * self.disturbance.change);
         let sign = if self.disturbance.change > 0.0 { "+" } else { "" };
         let line = |name: &str, (extra, error): (f64, f64)| {
-            format!("    {name}: work {:+.6}, terminal_error {}\n", extra, words::number(error))
+            let sign = if extra < 0.0 { "" } else { "+" };
+            format!("    {name}: work {sign}{}, terminal_error {}\n", words::number(extra), words::number(error))
         };
         format!(
             "  disturbed: theta {sign}{change} % at t = {}; extra work, and relative miss of the target theta\n{}{}  shown: {} loop\n",
@@ -707,10 +711,13 @@ impl Effects {
     }
 
     fn facts(&self) -> Vec<(String, String)> {
+        let (extra, error) = if self.shown == "open" { self.open } else { self.closed };
         [
             ("disturbed_theta", format!("{:?}", self.disturbance.change)),
             ("disturbed_at", format!("{:?}", self.t)),
             ("loop", self.shown.to_owned()),
+            ("extra_work", format!("{extra:?}")),
+            ("terminal_error", format!("{error:?}")),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .to_vec()

@@ -71,7 +71,7 @@ pub fn report(audits: &[Audit]) -> String {
         let named = named.map(|worst| (worst.column, units(worst.difference))).filter(|(_, units)| units != "0.000");
         let named: Vec<String> = named.map(|(column, units)| format!("{column} {units}")).collect();
         let named = match named.is_empty() {
-            _ if audit.rows == 0 => "none".to_owned(),
+            _ if audit.worst.is_empty() => "none".to_owned(),
             true => "below 0.001".to_owned(),
             false => named.join(", "),
         };
@@ -84,7 +84,9 @@ pub fn report(audits: &[Audit]) -> String {
             text.push_str(&format!("{table}: {} not checked: {reason}\n", words::things(*rows, "row")));
         }
     }
-    if audits.iter().all(|audit| audit.errors == 0 && audit.fault.is_none()) {
+    if audits.iter().all(|audit| audit.worst.is_empty()) {
+        text.push_str("no number was compared\n");
+    } else if audits.iter().all(|audit| audit.errors == 0 && audit.fault.is_none()) {
         text.push_str(&format!("no number differs by more than {MAX_DIFFERENCE_RTOLS} rtol\n"));
     }
     text

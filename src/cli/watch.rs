@@ -1,10 +1,10 @@
 //! Progress of long commands, and signals that stop them.
 
-use std::io::{IsTerminal, Write, stderr};
+use std::io::{Write, stderr};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::thread::Thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -20,7 +20,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Time after which a terminal shows the progress. Chosen: a user should not wait longer than a second without a message.
-const PROGRESS_DELAY: Duration = Duration::from_secs(1);
+pub const PROGRESS_DELAY: Duration = Duration::from_secs(1);
 
 /// Runs `work`. Meanwhile it shows the progress through `tables`, the rows of each and their mean cost, unless `quiet`, and passes Ctrl-C and SIGTERM
 /// on to `signal`.
@@ -36,29 +36,27 @@ pub fn watched<T>(signal: &Signal, tables: Vec<(u64, u64)>, quiet: bool, work: i
         show.update(signal);
     };
     let result = while_looking(look, work);
-    show.bar.iter().for_each(ProgressBar::finish_and_clear);
+    show.bar.finish_and_clear();
     (result, signals().caught())
 }
 
 /// Runs `work`, which writes nothing, and shows what it is `doing` on a terminal after a second. Ctrl-C and SIGTERM end the process with a message
 /// that nothing has changed. Waits must not be nested.
 pub fn waiting<T>(doing: &str, work: impl FnOnce() -> T) -> T {
-    let start = Instant::now();
-    let mut line: Option<ProgressBar> = None;
+    let line = spinner(doing);
     let look = |caught: Option<i32>| {
         if let Some(number) = caught {
-            line.iter().for_each(ProgressBar::finish_and_clear);
+            line.finish_and_clear();
             // A message that cannot be written is ignored.
             let _ = writeln!(stderr(), "stopped while {doing}; nothing has changed");
             process::exit(128 + number);
         }
-        if start.elapsed() > PROGRESS_DELAY && stderr().is_terminal() {
-            let seconds = words::duration(start.elapsed().as_secs_f64().floor());
-            line.get_or_insert_with(text_line).set_message(format!("{doing} ({seconds})"));
+        if line.elapsed() > PROGRESS_DELAY {
+            line.tick();
         }
     };
     let result = while_looking(look, work);
-    line.iter().for_each(ProgressBar::finish_and_clear);
+    line.finish_and_clear();
     result
 }
 
@@ -76,25 +74,13 @@ fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce(
         };
         // Without a second thread, there is no progress.
         let watcher = std::thread::Builder::new().spawn_scoped(scope, watch).ok();
-        // Ends the watcher also if the work panics, since the scope waits for it.
-        let _end = End { finished: &finished, signals, watcher: watcher.as_ref().map(|watcher| watcher.thread()) };
-        work()
+        // The scope waits for the watcher, also if the work panics.
+        let result = catch_unwind(AssertUnwindSafe(work));
+        signals.idle.store(true, Ordering::Release);
+        finished.store(true, Ordering::Release);
+        watcher.inspect(|watcher| watcher.thread().unpark());
+        result.unwrap_or_else(|panic| resume_unwind(panic))
     })
-}
-
-/// Ends the progress display on drop.
-struct End<'a> {
-    finished: &'a AtomicBool,
-    signals: &'a Signals,
-    watcher: Option<&'a Thread>,
-}
-
-impl Drop for End<'_> {
-    fn drop(&mut self) {
-        self.signals.idle.store(true, Ordering::Release);
-        self.finished.store(true, Ordering::Release);
-        self.watcher.inspect(|watcher| watcher.unpark());
-    }
 }
 
 /// The signal handlers of the process, installed at the first watched operation.
@@ -134,19 +120,19 @@ fn listen(number: i32, signals: &Signals) -> std::io::Result<()> {
     Ok(())
 }
 
-/// A progress line on a terminal: a message.
-fn text_line() -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr_with_hz(10));
-    set_style(&bar, false);
-    bar
+/// A line that states what a command is `doing`, on a terminal and once it ticks.
+pub fn spinner(doing: &str) -> ProgressBar {
+    bar(false, 0, "{msg} ({elapsed})").with_message(doing.to_owned())
 }
 
-/// Shows a message, after a bar if `has_bar`.
-fn set_style(bar: &ProgressBar, has_bar: bool) {
-    let template = if has_bar { "{bar:20} {percent}% of {human_len} rows, {msg}" } else { "{msg}" };
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
+/// A progress line, which appears only on a terminal and unless `quiet`.
+fn bar(quiet: bool, length: u64, template: &str) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(10) };
+    ProgressBar::with_draw_target(Some(length), target).with_style(style(template))
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 /// The progress of a run: a bar on a terminal, else a line at intervals.
@@ -156,7 +142,8 @@ struct ProgressDisplay {
     /// All rows.
     rows: u64,
     quiet: bool,
-    bar: Option<ProgressBar>,
+    /// The cost of the rows so far.
+    bar: ProgressBar,
     /// Time of the last line.
     last: Instant,
     /// The current phase.
@@ -168,70 +155,64 @@ struct ProgressDisplay {
 impl ProgressDisplay {
     fn new(tables: Vec<(u64, u64)>, quiet: bool) -> ProgressDisplay {
         let rows = tables.iter().fold(0_u64, |sum, (rows, _)| sum.saturating_add(*rows));
-        let bar = (!quiet && stderr().is_terminal()).then(text_line);
-        let now = Instant::now();
+        let (now, bar) = (Instant::now(), bar(quiet, cost(&tables, rows), "{msg}"));
         ProgressDisplay { tables, rows, quiet, bar, last: now, phase: Phase::Checking, since: now }
     }
 
     fn update(&mut self, signal: &Signal) {
-        let is_new = signal.phase() != self.phase;
+        let (done, kept, is_new) = (signal.rows(), signal.kept(), signal.phase() != self.phase);
         if is_new {
             (self.phase, self.since) = (signal.phase(), Instant::now());
         }
-        let done = signal.rows() + signal.kept();
         let is_computing = self.phase == Phase::Computing;
-        match &self.bar {
-            Some(bar) if is_computing => {
-                if is_new {
-                    bar.set_length(self.rows);
-                    set_style(bar, true);
-                }
-                bar.set_position(done);
-                bar.set_message(self.text(signal));
-            }
-            Some(bar) if self.since.elapsed() > PROGRESS_DELAY => {
-                set_style(bar, false);
-                bar.set_message(self.text(signal));
-            }
-            None if !self.quiet && self.last.elapsed() >= LINE_INTERVAL => {
+        if is_new {
+            self.bar.set_style(style(if is_computing { "{bar:20} {percent}% of {msg}" } else { "{msg}" }));
+        }
+        let text = self.text(signal);
+        if is_computing || self.since.elapsed() > PROGRESS_DELAY {
+            if self.bar.is_hidden() && !self.quiet && self.last.elapsed() >= LINE_INTERVAL {
                 self.last = Instant::now();
-                let rows = format!("{} of {} rows, ", words::count(done), words::count(self.rows));
+                let done = if is_computing { format!("{} of ", words::count(kept + done)) } else { String::new() };
                 // A progress line that cannot be written is no failure.
-                let _ = writeln!(stderr(), "{}{}", if is_computing { &rows } else { "" }, self.text(signal));
+                let _ = writeln!(stderr(), "{done}{text}");
             }
-            _ => {}
+            self.bar.set_message(text);
+        }
+        if is_computing {
+            self.bar.set_position(cost(&self.tables, kept + done));
+        }
+        if is_new && is_computing {
+            // Kept rows take no time.
+            self.bar.reset_eta();
         }
     }
 
-    /// The cost of the first `rows` rows.
-    fn cost(&self, mut rows: u64) -> f64 {
-        let costs = self.tables.iter().map(|&(all, cost)| {
-            let first = rows.min(all);
-            rows -= first;
-            first as f64 * cost as f64
-        });
-        costs.sum()
-    }
-
     fn text(&self, signal: &Signal) -> String {
-        let (done, kept) = (signal.rows(), signal.kept());
+        let all = words::things(self.rows, "row");
         match self.phase {
-            Phase::Checking => {
-                let (kept, all) = (words::count(kept), words::things(self.rows, "row"));
-                format!("checking existing parts: {kept} of {all}")
-            }
+            Phase::Checking => format!("checking existing parts: {} of {all}", words::count(signal.kept())),
             Phase::Computing => {
                 let seconds = self.since.elapsed().as_secs_f64().max(POLL_INTERVAL.as_secs_f64());
-                let mut text = format!("{} per second", words::count((done as f64 / seconds) as u64));
-                let [before, now, all] = [kept, kept + done, self.rows].map(|rows| self.cost(rows));
+                let rate = words::count((signal.rows() as f64 / seconds) as u64);
                 // The first rows do not determine the rest.
-                if now > before && self.since.elapsed() > PROGRESS_DELAY {
-                    let left = seconds * (all - now) / (now - before);
-                    text.push_str(&format!(", about {} left", words::duration(left)));
+                match self.bar.eta().as_secs_f64() {
+                    left if left > 0.0 && self.since.elapsed() > PROGRESS_DELAY => {
+                        format!("{all}, {rate} per second, about {} left", words::duration(left))
+                    }
+                    _ => format!("{all}, {rate} per second"),
                 }
-                text
             }
             Phase::Writing => "writing the last parts".to_owned(),
         }
     }
+}
+
+/// The cost of the first `rows` rows of tables with these numbers of rows and mean costs.
+fn cost(tables: &[(u64, u64)], mut rows: u64) -> u64 {
+    let costs = tables.iter().map(|&(all, cost)| {
+        let first = rows.min(all);
+        rows -= first;
+        first as f64 * cost as f64
+    });
+    costs.sum::<f64>() as u64
 }

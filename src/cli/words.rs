@@ -165,10 +165,4 @@ mod tests {
         assert_eq!(ranges([0, 1, 2, 5, 7, 8]), "0-2,5,7-8");
         assert_eq!(ranges([]), "");
     }
-
-    #[test]
-    fn columns_are_aligned() {
-        let rows = [vec!["t_f".to_owned(), "gap".to_owned()], vec!["0.02".to_owned(), "1e-7".to_owned()]];
-        assert_eq!(aligned(&rows, 2), "  t_f   gap\n  0.02  1e-7\n");
-    }
 }

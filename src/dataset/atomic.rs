@@ -11,6 +11,7 @@ use std::time::{Duration, Instant, SystemTime};
 use tempfile::NamedTempFile;
 
 use super::folder::{DatasetError, failed};
+use crate::file::folder_of;
 
 /// Age from which a temporary file of another machine is treated as abandoned, by the clock of the file system. Chosen: writing one takes seconds, and a day covers wrong clocks.
 const MAX_TEMPORARY_AGE: Duration = Duration::from_secs(24 * 60 * 60);
@@ -54,11 +55,6 @@ fn filled<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut File) -> Resul
     fill(temporary.as_file_mut())?;
     temporary.as_file().sync_all()?;
     Ok(temporary)
-}
-
-/// The folder of a file.
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Creates a temporary file for `path` in its folder, which is removed unless it is renamed. Its name holds the machine; its lock shows
@@ -220,19 +216,5 @@ mod tests {
             is_done.store(true, std::sync::atomic::Ordering::Relaxed);
             assert_eq!(lost, 0);
         });
-    }
-
-    #[test]
-    fn a_new_file_replaces_no_other() {
-        let folder = tempfile::tempdir().expect("is writable");
-        let path = folder.path().join("x");
-        assert!(write_new(&path, b"first").expect("is writable"));
-        assert!(!write_new(&path, b"second").expect("is writable"));
-        assert_eq!(fs::read(&path).expect("is readable"), b"first");
-        write(&path, b"third").expect("is writable");
-        assert_eq!(
-            (fs::read(&path).expect("is readable"), names(folder.path())),
-            (b"third".to_vec(), vec!["x".to_owned()])
-        );
     }
 }

@@ -12,6 +12,9 @@ use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, State};
 use crate::file;
 
+/// The name of the file of the manifest.
+pub const MANIFEST: &str = "manifest.json";
+
 /// The help if the folder contains another dataset.
 const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
@@ -37,10 +40,10 @@ pub enum DatasetError {
     OtherTables { folder: String, expected: String, found: String },
     /// Another run writes the dataset.
     #[error(
-        "{folder}: another run is writing this dataset{process}\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
+        "{folder}: another run is writing this dataset\n  help: wait for its end (`slipsweep status {folder}` shows its progress); only \
          shards (--shard I/N) run side by side"
     )]
-    Busy { folder: String, process: String },
+    Busy { folder: String },
     /// The dataset was changed during this run.
     #[error(
         "{folder}: {what} during this run, which stopped\n  help: run the same command again; it keeps finished parts"
@@ -54,10 +57,10 @@ pub enum DatasetError {
     Occupied { folder: String },
     /// A file with the name of a part does not belong to this sweep.
     #[error(
-        "{path}: belongs to another {what}\n  expected: {expected}\n  found: {found}\n  help: move the file away; `slipsweep run` then \
-         computes the part and keeps all others"
+        "{path}: not a part of this dataset: {why}\n  help: move the file away; `slipsweep run` then computes the part and keeps all \
+         others"
     )]
-    ForeignPart { path: String, what: &'static str, expected: String, found: String },
+    ForeignPart { path: String, why: String },
     /// A part is damaged.
     #[error(
         "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
@@ -119,7 +122,7 @@ impl Folder {
 
     /// The path of the manifest.
     pub fn manifest_path(&self) -> PathBuf {
-        self.path.join("manifest.json")
+        self.path.join(MANIFEST)
     }
 
     /// The manifest, if any; reconstructed from the parts if its file is missing or damaged.
@@ -244,7 +247,7 @@ impl Folder {
     pub fn fault(&self, path: &Path, state: State) -> DatasetError {
         let (path, dataset) = (path.display().to_string(), self.path.display().to_string());
         match state {
-            State::Foreign { what, expected, found } => DatasetError::ForeignPart { path, what, expected, found },
+            State::Foreign { why } => DatasetError::ForeignPart { path, why },
             State::Damaged { why } => DatasetError::DamagedPart { path, why, dataset },
             State::Missing | State::There { .. } => {
                 DatasetError::DamagedPart { path, why: "it changed while it was read".to_owned(), dataset }

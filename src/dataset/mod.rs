@@ -25,7 +25,7 @@ mod survey;
 
 pub use batch::batch;
 pub use cell::Cell;
-pub use folder::{DatasetError, Folder};
+pub use folder::{DatasetError, Folder, MANIFEST};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
 pub use frame::{FrameError, ReadError, Row};
@@ -38,8 +38,9 @@ pub use layout::Layout;
 pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
-pub use session::{Concurrency, Holder, Session};
-pub use state::{CheckDepth, PROGRAM, State};
+pub use session::{Concurrency, Session};
+pub(crate) use state::OTHER_SWEEP;
+pub use state::{CheckDepth, State};
 pub use statistics::{Counts, MAX_KEPT_ROWS, Row as StatisticsRow, TableStatistics};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

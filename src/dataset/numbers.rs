@@ -98,41 +98,9 @@ pub fn double_statistics(range: Option<(f64, f64)>, nulls: u64) -> Statistics {
 
 #[cfg(test)]
 mod tests {
-    //! Streams and ranges against straightforward implementations.
+    //! Repeated numbers.
 
     use super::*;
-
-    fn cells(count: usize) -> Vec<f64> {
-        let mut state = 1_u64;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            state >> 33
-        };
-        let mut cells = Vec::new();
-        while cells.len() < count {
-            let (length, missing) = (next() % 200, next() % 3 == 0);
-            for _ in 0..length {
-                cells.push(if missing { f64::NAN } else { next() as f64 - 1e9 });
-            }
-        }
-        cells.truncate(count);
-        cells
-    }
-
-    #[test]
-    fn streams_are_bytes_of_equal_place() {
-        for count in [0, 1, 7, 8, 511, 512, 513, 3000] {
-            let values: Vec<f64> = cells(2 * count).into_iter().filter(|cell| !cell.is_nan()).take(count).collect();
-            let mut streams = vec![0; 8 * values.len()];
-            split(&values, &mut streams);
-            for (i, value) in values.iter().enumerate() {
-                let bytes: Vec<u8> = (0..8).map(|byte| streams[byte * values.len() + i]).collect();
-                assert_eq!(bytes, value.to_le_bytes());
-            }
-            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-            assert_eq!(range(&values), (least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)));
-        }
-    }
 
     #[test]
     fn repetition_is_found_where_it_pays() {

@@ -4,7 +4,8 @@
 
 use std::fs::{self, File, TryLockError};
 use std::path::Path;
-use std::time::SystemTime;
+use std::thread;
+use std::time::{Duration, SystemTime};
 
 use super::atomic;
 use super::folder::{DatasetError, Folder};
@@ -171,49 +172,24 @@ impl Drop for Lock {
 /// The lock of a run on the folder of its dataset; `None` if folders cannot be locked.
 fn lock(folder: &Path, company: Concurrency) -> Result<Option<Lock>, DatasetError> {
     let Ok(file) = File::open(folder) else { return Ok(None) };
-    let locked = match company {
+    let locked = || match company {
         Concurrency::Alone => file.try_lock(),
         Concurrency::Shards => file.try_lock_shared(),
     };
-    match locked {
-        Err(TryLockError::WouldBlock) => {
-            let process =
-                holders(&file).first().map_or(String::new(), |holder| format!(" (process {})", holder.process));
-            Err(DatasetError::Busy { folder: folder.display().to_string(), process })
-        }
+    // `status` has a lock for an instant.
+    let first = locked().inspect_err(|_| thread::sleep(LOCK_PAUSE));
+    match first.or_else(|_| locked()) {
+        Err(TryLockError::WouldBlock) => Err(DatasetError::Busy { folder: folder.display().to_string() }),
         _ => Ok(Some(Lock(file))),
     }
 }
 
-/// A run that holds a lock on the folder of a dataset.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Holder {
-    /// Its process, on this machine.
-    pub process: u32,
-    /// Whether it is a run of the whole sweep, not of a shard.
-    pub is_alone: bool,
-}
+/// Pause before a second attempt to lock a folder. Chosen: much longer than the lock of `status`.
+const LOCK_PAUSE: Duration = Duration::from_millis(20);
 
 impl Folder {
-    /// The runs of this machine that write to the dataset, if the system lists them. Acquires no lock.
-    pub fn runs(&self) -> Vec<Holder> {
-        File::open(self.path()).map_or_else(|_| Vec::new(), |file| holders(&file))
+    /// Whether a run of the whole sweep is writing to the dataset.
+    pub fn is_busy(&self) -> bool {
+        matches!(lock(self.path(), Concurrency::Shards), Err(DatasetError::Busy { .. }))
     }
-}
-
-/// The processes with a lock on `file`, from the list of Linux: `1: FLOCK  ADVISORY  WRITE 4711 08:01:131075 0 EOF`.
-fn holders(file: &File) -> Vec<Holder> {
-    #[cfg(unix)]
-    let number = file.metadata().map(|metadata| std::os::unix::fs::MetadataExt::ino(&metadata));
-    #[cfg(not(unix))]
-    let number = file.metadata().map(|metadata| metadata.len());
-    let (Ok(number), Ok(locks)) = (number, fs::read_to_string("/proc/locks")) else { return Vec::new() };
-    let place = format!(":{number}");
-    let holder = |line: &str| {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let is_ours = words.get(1) == Some(&"FLOCK") && words.get(5).is_some_and(|word| word.ends_with(&place));
-        let process = words.get(4)?.parse().ok()?;
-        is_ours.then_some(Holder { process, is_alone: words[3] == "WRITE" })
-    };
-    locks.lines().filter_map(holder).collect()
 }

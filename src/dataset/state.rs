@@ -1,7 +1,6 @@
 //! The state of a part: whether its file is the expected one and intact.
 
 use std::io;
-use std::ops::Range;
 use std::path::Path;
 
 use bytes::Bytes;
@@ -11,7 +10,7 @@ use parquet::file::reader::ChunkReader;
 use super::checksum;
 use super::footer::{Footer, PREFIX};
 use super::guard::sound;
-use super::manifest::{Manifest, ManifestTable};
+use super::manifest::Manifest;
 use super::statistics::TableStatistics;
 use crate::file;
 
@@ -32,8 +31,8 @@ pub enum State {
     Missing,
     /// The expected part.
     There { statistics: Box<TableStatistics> },
-    /// A file of another spec or version, which may be valuable and is never replaced.
-    Foreign { what: &'static str, expected: String, found: String },
+    /// A file of another sweep, version or program, which may be valuable and is never replaced.
+    Foreign { why: String },
     /// A damaged part, which a run replaces.
     Damaged { why: String },
 }
@@ -58,9 +57,7 @@ fn sealed_entries(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     let entries = entries(&metadata);
     match sound(|| checksum::is_head_intact(&file, &metadata)) {
         Ok(Some(true)) => Ok(Some(entries)),
-        Ok(None) if Footer::from_entries(&entries).is_none() => {
-            Err(stranger("a Parquet file that slipsweep did not write"))
-        }
+        Ok(None) if Footer::from_entries(&entries).is_none() => foreign(OTHER_PROGRAM),
         Ok(_) => damaged("the checksum of its footer and page headers does not match"),
         Err(error) => damaged(&error.to_string()),
     }
@@ -79,12 +76,8 @@ fn there<T>(read: io::Result<T>) -> Result<Option<T>, State> {
     };
     match error.kind() {
         io::ErrorKind::NotFound => Ok(None),
-        io::ErrorKind::InvalidInput => Err(stranger(&error.to_string())),
-        // It may be intact.
-        io::ErrorKind::PermissionDenied => {
-            let expected = "a file that this user can read".to_owned();
-            Err(State::Foreign { what: "user", expected, found: error.to_string() })
-        }
+        // A file that this user cannot read may be intact.
+        io::ErrorKind::InvalidInput | io::ErrorKind::PermissionDenied => foreign(&error.to_string()),
         _ => damaged(&format!("it cannot be read: {error}")),
     }
 }
@@ -103,12 +96,14 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     Ok(Some(entries))
 }
 
-/// What is foreign about a file of another program, such as a part that a user edited.
-pub const PROGRAM: &str = "program";
+/// Why a file of another program is foreign, such as a part that a user edited.
+const OTHER_PROGRAM: &str = "a Parquet file that slipsweep did not write";
 
-/// The state of a file of another program.
-fn stranger(found: &str) -> State {
-    State::Foreign { what: PROGRAM, expected: "a part that slipsweep wrote".to_owned(), found: found.to_owned() }
+/// Why a part of slipsweep is foreign.
+pub const OTHER_SWEEP: &str = "it belongs to another place, sweep, version or numerics revision";
+
+fn foreign<T>(why: &str) -> Result<T, State> {
+    Err(State::Foreign { why: why.to_owned() })
 }
 
 fn damaged<T>(why: &str) -> Result<T, State> {
@@ -126,30 +121,11 @@ fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
 
 /// The statistics in the footer of a file, if it is that of the expected part.
 fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<TableStatistics, State> {
-    let foreign = |what, expected: &str, found: &str| {
-        Err(State::Foreign { what, expected: expected.to_owned(), found: found.to_owned() })
-    };
     let (Some(found), Some(statistics)) = (Footer::from_entries(entries), Footer::statistics(entries)) else {
-        return Err(stranger("a Parquet file that slipsweep did not write"));
+        return foreign(OTHER_PROGRAM);
     };
-    let planned = manifest.table(table);
-    let hash = |table: Option<&ManifestTable>| table.map_or(String::new(), |table| table.hash.clone());
-    let plan = |table: Option<&ManifestTable>| {
-        table.map_or(String::new(), |table| format!("{} rows in {} parts", table.rows, table.parts))
-    };
-    let place = |rows: &Range<u64>| format!("rows {} to {}", rows.start, rows.end);
-    let rows = planned.map(|planned| planned.rows_of(part)).unwrap_or_default();
-    if let Some((what, expected, found)) = manifest.build.difference(&found.manifest.build) {
-        foreign(what, expected, found)
-    } else if found.table != table {
-        foreign("table", table, &found.table)
-    } else if hash(found.planned()) != hash(planned) {
-        foreign("spec", &hash(planned), &hash(found.planned()))
-    } else if found.planned() != planned {
-        foreign("plan", &plan(planned), &plan(found.planned()))
-    } else if found.rows != rows {
-        foreign("place in the table", &place(&rows), &place(&found.rows))
-    } else {
-        Ok(statistics)
-    }
+    let is_expected = manifest.table(table).is_some_and(|planned| {
+        found.planned() == Some(planned) && found.table == table && found.rows == planned.rows_of(part)
+    });
+    if is_expected && found.manifest.build == manifest.build { Ok(statistics) } else { foreign(OTHER_SWEEP) }
 }

@@ -37,8 +37,8 @@ pub struct TableSurvey {
     pub missing: Vec<Range<u64>>,
     /// Damaged parts, with the kind of damage.
     pub damaged: Vec<(u64, String)>,
-    /// Foreign parts: the differing property, the expected and the found value.
-    pub foreign: Vec<(u64, [String; 3])>,
+    /// Foreign parts, with the reason.
+    pub foreign: Vec<(u64, String)>,
     /// The statistics of the existing parts.
     pub statistics: TableStatistics,
 }
@@ -103,9 +103,7 @@ impl Survey {
                     // It was just removed.
                     State::Missing => survey.miss(part..part + 1),
                     State::Damaged { why } => survey.damaged.push((part, why)),
-                    State::Foreign { what, expected, found } => {
-                        survey.foreign.push((part, [what.to_owned(), expected, found]));
-                    }
+                    State::Foreign { why } => survey.foreign.push((part, why)),
                 }
             }
             survey.miss(next..table.parts);

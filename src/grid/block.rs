@@ -86,6 +86,9 @@ fn is_monotone(values: &Values) -> bool {
     list.windows(2).all(|pair| pair[0] < pair[1]) || list.windows(2).all(|pair| pair[0] > pair[1])
 }
 
+/// Increment of the counter of SplitMix64: 2^64 over the golden ratio.
+pub(crate) const SPLIT_MIX_INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// A hash of `bits`: the finaliser of SplitMix64 (Steele, Lea and Flood 2014, doi:10.1145/2714064.2660195).
 pub(crate) fn mixed(bits: u64) -> u64 {
     let bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

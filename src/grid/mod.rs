@@ -11,8 +11,8 @@ mod sampler;
 mod view;
 
 pub use axis::{Axis, Values};
-pub(crate) use block::mixed;
 pub use block::{Block, Derived, Digit, Digits, Factor, Label};
+pub(crate) use block::{SPLIT_MIX_INCREMENT, mixed};
 pub use design::Design;
 pub use expression::{Expression, Fault};
 pub use quantity::{Domain, Point, Quantity, RTOL, Scale};

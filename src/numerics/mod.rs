@@ -6,6 +6,7 @@ pub mod dilogarithm;
 pub mod double_double;
 pub mod elementary;
 pub mod gauss;
+pub mod golden_section;
 pub mod lambert;
 pub mod lanes;
 pub mod polynomial;

@@ -56,10 +56,14 @@ impl Format {
             Format::Pdf => {
                 let page = PageOptions { dpi: CSS_DPI as f32 };
                 let pdf = svg2pdf::to_pdf(&tree(svg)?, ConversionOptions::default(), page);
-                pdf.map_err(|error| PlotError::Convert(error.to_string()))
+                pdf.map_err(unconvertible)
             }
         }
     }
+}
+
+fn unconvertible(error: impl std::fmt::Display) -> PlotError {
+    PlotError::Refused(format!("cannot convert the picture: {error}\n  help: write it as .svg"))
 }
 
 fn tree(svg: &str) -> Result<usvg::Tree, PlotError> {
@@ -70,21 +74,22 @@ fn tree(svg: &str) -> Result<usvg::Tree, PlotError> {
     fonts.set_sans_serif_family("Arimo");
     let options =
         usvg::Options { font_family: "Arimo".to_owned(), fontdb: Arc::new(fonts), ..usvg::Options::default() };
-    usvg::Tree::from_str(svg, &options).map_err(|error| PlotError::Convert(error.to_string()))
+    usvg::Tree::from_str(svg, &options).map_err(unconvertible)
 }
 
 fn png(tree: &usvg::Tree, dpi: f64) -> Result<Vec<u8>, PlotError> {
     let scale = dpi / CSS_DPI;
     let (width, height) =
         ((f64::from(tree.size().width()) * scale).ceil(), (f64::from(tree.size().height()) * scale).ceil());
-    let size = PlotError::Size { width, height };
+    let what = format!("a picture of {width} x {height} pixels is too large\n  help: lower --dpi");
+    let size = PlotError::Refused(what);
     if !(width >= 1.0 && height >= 1.0 && width * height <= MAX_PIXELS) {
         return Err(size);
     }
     let mut pixels = Pixmap::new(width as u32, height as u32).ok_or(size)?;
     pixels.fill(Color::WHITE);
     resvg::render(tree, Transform::from_scale(scale as f32, scale as f32), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| PlotError::Convert(error.to_string()))
+    pixels.encode_png().map_err(unconvertible)
 }
 
 /// Pixels as a PNG, row by row from the top: a colour, or `None` for transparent. `None` without pixels.

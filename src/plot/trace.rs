@@ -66,8 +66,11 @@ pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     let (columns, facts) = if is_csv { csv(path, &shown)? } else { parquet(path)? };
     let missing = ["t", "v"].into_iter().find(|name| !columns.iter().any(|column| column.name == *name));
     if let Some(missing) = missing {
-        let found = columns.into_iter().map(|column| column.name).collect();
-        return Err(PlotError::NoTrace { path: shown, missing, found });
+        let found = columns.into_iter().map(|column| column.name).collect::<Vec<_>>().join(", ");
+        return Err(PlotError::Refused(format!(
+            "{shown}: not a trace: it has no column `{missing}`\n  found: {found}\n  help: `slipsweep trace … --out FILE` writes traces; \
+             of a dataset, name the folder"
+        )));
     }
     Ok(TraceFile::new(columns, &facts, stem))
 }
@@ -116,8 +119,8 @@ impl TraceFile {
         match column.filter(|name| self.column(name).is_none()) {
             None => Ok(()),
             Some(name) => {
-                let found = self.columns.iter().map(|column| column.name.clone()).collect();
-                Err(PlotError::NoTraceColumn { argument, name: name.to_owned(), found })
+                let known: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
+                Err(PlotError::unknown(&format!("{argument}: the trace has no column"), name, &known))
             }
         }
     }
@@ -144,7 +147,7 @@ fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
 fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let text = file::open(path)
         .and_then(std::io::read_to_string)
-        .map_err(|error| PlotError::Read { path: shown.to_owned(), reason: error.to_string() })?;
+        .map_err(|error| PlotError::Refused(format!("{shown}: cannot be read: {error}")))?;
     let comments = text.lines().take_while(|line| line.starts_with('#'));
     let facts: Facts = comments
         .filter_map(|line| line.trim_start_matches('#').split_once('='))
@@ -163,11 +166,9 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let mut columns: Vec<Column> = names.split(',').map(str::trim).enumerate().map(column).collect();
     for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
         let cells: Vec<&str> = line.split(',').collect();
-        let wrong = |found: String, expected: String| PlotError::Cell {
-            path: shown.to_owned(),
-            line: number + 1,
-            found,
-            expected,
+        let wrong = |found: String, expected: String| {
+            let (line, help) = (number + 1, "`slipsweep trace … --out FILE.csv` writes traces");
+            PlotError::Refused(format!("{shown}, line {line}: found {found}\n  expected: {expected}\n  help: {help}"))
         };
         if cells.len() != columns.len() {
             return Err(wrong(format!("{} cells", cells.len()), format!("{} as in the first line", columns.len())));
@@ -198,12 +199,13 @@ struct Curve {
 /// Too many traces, a column that one does not have, or traces without values.
 pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure, PlotError> {
     if traces.len() > MAX_SERIES {
-        return Err(PlotError::TooManyTraces { found: traces.len(), most: MAX_SERIES });
+        let found = format!("{} traces are too many for one picture", traces.len());
+        return Err(PlotError::Refused(format!("{found}\n  expected: at most {MAX_SERIES}")));
     }
     traces.iter().try_for_each(|trace| trace.check("--x", x).and_then(|()| trace.check("--y", y)))?;
     let x = x.unwrap_or("t");
     if Some(x) == y {
-        return Err(PlotError::SameAxes { axis: x.to_owned() });
+        return Err(PlotError::same_axes(x));
     }
     let groups: Vec<Vec<&str>> = match y {
         Some(y) => vec![vec![y]],
@@ -261,8 +263,10 @@ fn one_unit<'a>(traces: &[TraceFile], names: impl Iterator<Item = &'a str>) -> R
         let first = unit_in(traces, name);
         let mut units = traces.iter().filter_map(|trace| Some(trace.column(name)?.unit.as_str()));
         if let Some(other) = units.find(|unit| *unit != first) {
-            let units = [first, other.to_owned()];
-            return Err(PlotError::Units { column: name.to_owned(), units });
+            return Err(PlotError::Refused(format!(
+                "the traces differ in the unit of `{name}`\n  found: {first} and {other}\n  expected: the same units\n  help: draw them one \
+                 by one, or trace both in the same units"
+            )));
         }
     }
     Ok(())

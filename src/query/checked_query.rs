@@ -185,7 +185,7 @@ impl VisitorMut for Check<'_> {
             // polars would ignore the order.
             Some(window) if self.is_ordered(window) && !is_one_of(ORDERED, function) => self.refuse(
                 format!("`{expression}`: no running `{}`", function.name),
-                "leave ORDER BY out; these take it: row_number, lag, lead, first_value, last_value, sum, count, min, max",
+                "with ORDER BY, use row_number, lag, lead, first_value, last_value, sum, count, min or max",
             ),
             _ => ControlFlow::Continue(()),
         }
@@ -695,6 +695,8 @@ impl VisitorMut for PolarsDialect {
     fn post_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         match expression {
             Expr::Value(ValueWithSpan { value: Value::Number(digits, _), .. }) => *digits = plain(digits),
+            // polars would cast the code of a category.
+            Expr::Cast { expr, .. } => self.as_text(expr),
             Expr::Like { expr, .. }
             | Expr::ILike { expr, .. }
             | Expr::SimilarTo { expr, .. }

@@ -76,7 +76,7 @@ pub enum QueryError {
     Part(Arc<DatasetError>),
     /// A file cannot be read.
     #[error(
-        "{path}: cannot read: {source}\n  help: if a run wrote it, run the sweep again; it recomputes damaged parts"
+        "{path}: cannot read: {source}\n  help: check the file; if a run wrote it, run the sweep again, which recomputes damaged parts"
     )]
     Read { path: String, source: PolarsError },
 }

@@ -164,6 +164,10 @@ fn csv(path: &Path) -> PolarsResult<DataFrame> {
             opened = if opened.is_none() { Some(number + 1) } else { None };
         }
     }
+    let header = bytes.split(|&byte| byte == b'\n').find(|line| !line.starts_with(b"#")).unwrap_or_default();
+    if !header.contains(&b',') && header.iter().any(|byte| b";\t".contains(byte)) {
+        return Err(PolarsError::ComputeError("columns that end with ; or a tab; write CSV with commas".into()));
+    }
     if let Some(line) = opened {
         return Err(PolarsError::ComputeError(format!("line {line}: a quote is not closed").into()));
     }

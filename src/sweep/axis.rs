@@ -170,7 +170,11 @@ impl AxisDraft<'_> {
         if !(least as f64..=most as f64).contains(&count) || count.fract() != 0.0 {
             let (found, expected) =
                 (format!("{count} is not a count of values"), format!("a whole number from {least} to {most}"));
-            let help = "the third number is the count of values, not their distance; for one value write the number";
+            let help = match count {
+                1.0 => "for one value write the number itself",
+                _ if count.fract() != 0.0 => "the third number is the count of values, not their distance",
+                _ => "choose a count in this range",
+            };
             return refuse(format!("{key}[2]"), found, expected, help);
         }
         Ok((first, last, count as u64))

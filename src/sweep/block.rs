@@ -3,18 +3,19 @@
 use std::path::Path;
 
 use super::axis::{Sampled, Written, read};
-use super::error::{SpecError, refuse, unknown};
+use super::error::{SpecError, all, refuse, unknown};
 use super::points;
 use super::spec::BlockSpec;
 use super::units::legal;
 use crate::grid::{Axis, Block, Derived, Design, Expression, Factor, Fault, Quantity, Scale, Values, first_wrong};
 use crate::model::Units;
+use crate::table;
 
 /// Checks `spec`, whose keys begin with `prefix`; files are relative to `folder`.
 ///
 /// # Errors
 ///
-/// The first fault.
+/// The faults.
 pub fn check(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Result<Block, SpecError> {
     let mut factors = Vec::new();
     if let Some(path) = &spec.points {
@@ -22,8 +23,7 @@ pub fn check(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Re
         factors.push(points.map_err(|error| SpecError { key: format!("{prefix}{}", error.key).into(), ..error })?);
     }
     let mut held: Vec<Quantity> = factors.iter().flat_map(|factor| &factor.axes).map(|axis| axis.quantity).collect();
-    let mut axes = Vec::new();
-    for (name, axis) in &spec.axes {
+    let axes = spec.axes.iter().map(|(name, axis)| {
         let key = format!("{prefix}axes.{name}");
         let Some(quantity) = Quantity::from_name(name) else {
             return Err(unknown(key, "axis", name, &Quantity::ALL.map(Quantity::name)));
@@ -32,8 +32,9 @@ pub fn check(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Re
             let found = format!("`{name}` is also a column of `points`");
             return refuse(key, found, "each axis once", "remove the axis here or the column there");
         }
-        axes.push((quantity, read(quantity, units, &key, axis)?));
-    }
+        Ok((quantity, read(quantity, units, &key, axis)?))
+    });
+    let axes = all(axes)?;
     held.extend(axes.iter().map(|(quantity, _)| *quantity));
     let has_default = |quantity: &Quantity| !quantity.default().is_empty() && !quantity.is_tacit();
     let defaults: Vec<Quantity> =
@@ -228,5 +229,13 @@ pub fn too_many(key: String) -> SpecError {
 /// A fault of an expression at `key`.
 fn explain(key: String, fault: Fault) -> SpecError {
     let place = fault.position.map_or_else(String::new, |position| format!("position {position}: "));
-    SpecError::new(key, format!("{place}{}", fault.found), fault.expected, fault.help)
+    let is_result =
+        |name: &str| table::ALL.iter().any(|table| table.columns().iter().any(|column| column.name == name));
+    let help = match fault.found.strip_prefix("unknown axis `").and_then(|rest| rest.strip_suffix('`')) {
+        Some(name) if is_result(name) => {
+            "this is a result; filter results with `query`, or with `plot --where`".to_owned()
+        }
+        _ => fault.help,
+    };
+    SpecError::new(key, format!("{place}{}", fault.found), fault.expected, help)
 }

@@ -1,4 +1,4 @@
-//! The checked sweep: grid, tables and columns of a legal spec, or its first fault.
+//! The checked sweep: grid, tables and columns of a legal spec, or its faults.
 
 use std::fs;
 use std::io::{self, Read};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::block::{self, too_many};
-use super::error::{SpecError, refuse, unknown};
+use super::error::{SpecError, all, refuse, unknown};
 use super::laws;
 use super::spec::{BlockSpec, Spec, TableSpec};
 use super::units::{doubtful_axis, doubtful_scales, units};
@@ -72,8 +72,7 @@ pub fn path_hint(path: &Path, ending: &str) -> String {
     if ending.is_empty() && dataset.is_dir() {
         return format!("did you mean `{}`?", dataset.display());
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let entries = fs::read_dir(file::folder_of(path)).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
     names.sort();
     let name = if ending.is_empty() { path.file_name() } else { path.file_stem() };
@@ -89,11 +88,10 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// The fault of the file or spec, with its line.
+    /// The faults of the file or spec, with their lines.
     pub fn load(path: &Path) -> Result<Sweep, SpecError> {
-        let mut text = String::new();
-        let read = file::open(path).and_then(|file| file.take(MAX_SPEC_BYTES + 1).read_to_string(&mut text));
-        read.map_err(|error| {
+        let text = file::open(path).and_then(|file| file::text(file.take(MAX_SPEC_BYTES + 1)));
+        let text = text.map_err(|error| {
             let help = match error.kind() {
                 io::ErrorKind::NotFound => path_hint(path, ".toml"),
                 io::ErrorKind::InvalidData => "save it as UTF-8 in the editor".to_owned(),
@@ -121,7 +119,7 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// The fault of the spec, with its line.
+    /// The faults of the spec, with their lines.
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
         Sweep::check(&Spec::parse(text)?, text, folder)
     }
@@ -130,24 +128,22 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// The fault of the spec, with its line.
+    /// The faults of the spec, with their lines.
     pub fn check(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
         Sweep::checked(spec, text, folder).map_err(|fault| fault.located(text))
     }
 
     fn checked(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        check_name(&spec.name)?;
-        let units = units(&spec.model)?;
-        check_rtol("accuracy.rtol", spec.accuracy.rtol)?;
-        let friction = laws::friction(&spec.model)?;
-        let blocks = blocks(spec, &units, folder)?;
-        let grid = Grid { blocks: blocks.into_iter().map(Arc::new).collect(), units };
-        if spec.tables.is_empty() {
-            let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
-            return refuse("tables", "no table is requested", expected, "add a line such as [tables.optimal]");
-        }
-        let requests = spec.tables.iter().map(|(name, table)| request(name, table, spec, friction, &grid));
-        let requests = requests.collect::<Result<Vec<Request>, _>>()?;
+        let (mut known_units, mut friction, mut grid) = (Units::Scaled, Friction::default(), Vec::new());
+        let axes = units(&spec.model).and_then(|units| {
+            known_units = units;
+            grid = blocks(spec, &units, folder)?;
+            Ok(())
+        });
+        let form = laws::friction(&spec.model).map(|form| friction = form);
+        all([check_name(&spec.name), axes, check_rtol("accuracy.rtol", spec.accuracy.rtol), form, check_tables(spec)])?;
+        let grid = Grid { blocks: grid.into_iter().map(Arc::new).collect(), units: known_units };
+        let requests = all(spec.tables.iter().map(|(name, table)| request(name, table, spec, friction, &grid)))?;
         let warnings = doubtful_scales(&spec.model).into_iter().chain(unused(spec, &grid, &requests));
         // A condition may drop the points outside.
         let unconditional = spec.blocks().zip(&grid.blocks).filter(|(_, block)| block.condition.is_none());
@@ -224,7 +220,7 @@ impl Request {
     }
 }
 
-/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads.
+/// Warnings on axes of the spec that no table has, and that neither a computed axis nor the condition reads; and on ceilings that some tables lack.
 fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
     let gap = |request: &Request| request.members.as_ref().and_then(|_| table::find("gap"));
     let tables: Vec<&Table> =
@@ -237,18 +233,34 @@ fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
         let read: Vec<Quantity> = expressions.flat_map(|expression| expression.reads()).collect();
         for quantity in written.axes.keys().filter_map(|name| Quantity::from_name(name)) {
             let has = |table: &Table| table.axes().contains(&quantity);
-            if tables.iter().any(|table| has(table)) || read.contains(&quantity) || has_best && quantity.has_scale() {
+            let is_ceiling = matches!(quantity, Quantity::VelocityCeiling | Quantity::FrictionCeiling)
+                && block.may_be(quantity, f64::is_finite);
+            let is_used = tables.iter().any(|table| has(table));
+            // A ceiling also changes the optimum with which a table compares, unless the table lacks it.
+            let lacks = |table: &&&Table| !has(table) && (!is_used || is_ceiling && is_of_optimum(table));
+            let lacking: Vec<&Table> = tables.iter().filter(lacks).copied().collect();
+            if lacking.is_empty() || !is_used && (read.contains(&quantity) || has_best && quantity.has_scale()) {
                 continue;
             }
             let names = |tables: &[&Table]| tables.iter().map(|table| table.name()).collect::<Vec<_>>().join(", ");
             let others: Vec<&Table> = table::ALL.into_iter().filter(|table| has(table)).collect();
-            let help = format!("remove it, or add a table that has it: {}", names(&others));
+            let (expected, help) = if is_used {
+                ("numbers under the ceiling", "read these tables as those without the ceiling".to_owned())
+            } else {
+                let help = format!("remove it, or add a table that has it: {}", names(&others));
+                ("an axis of a requested table", help)
+            };
             let (key, found) =
-                (format!("{prefix}axes.{}", quantity.name()), format!("no effect on {}", names(&tables)));
-            warnings.push(SpecError::new(key, found, "an axis of a requested table", help));
+                (format!("{prefix}axes.{}", quantity.name()), format!("no effect on {}", names(&lacking)));
+            warnings.push(SpecError::new(key, found, expected, help));
         }
     }
     warnings
+}
+
+/// Whether numbers of a table are those of an optimum, or compared with one.
+fn is_of_optimum(table: &Table) -> bool {
+    table.columns().iter().any(|column| matches!(column.name, "work_optimal" | "t_cross"))
 }
 
 /// Rows that cover every optimal problem that is shared; `None` if there is none.
@@ -291,8 +303,7 @@ fn blocks(spec: &Spec, units: &Units, folder: &Path) -> Result<Vec<Block>, SpecE
             help,
         );
     }
-    let checked = spec.blocks().map(|(prefix, one)| block::check(one, &prefix, units, folder));
-    let mut blocks = checked.collect::<Result<Vec<Block>, _>>()?;
+    let mut blocks = all(spec.blocks().map(|(prefix, one)| block::check(one, &prefix, units, folder)))?;
     for quantity in Quantity::ALL {
         let Some((first, usual)) = blocks.iter().enumerate().find_map(|(at, block)| Some((at, block.scale(quantity)?)))
         else {
@@ -324,6 +335,17 @@ pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
         return Ok(());
     }
     refuse(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range")
+}
+
+/// Checks that `spec` requests tables, and none that is unknown.
+fn check_tables(spec: &Spec) -> Result<(), SpecError> {
+    let known = table::ALL.map(|table| table.name());
+    if spec.tables.is_empty() {
+        let expected = format!("at least one of {}", known.join(", "));
+        return refuse("tables", "no table is requested", expected, "add a line such as [tables.optimal]");
+    }
+    let unknowns = spec.tables.keys().filter(|name| !known.contains(&name.as_str()));
+    all(unknowns.map(|name| Err::<(), _>(unknown(format!("tables.{name}"), "table", name, &known)))).map(|_| ())
 }
 
 /// The table `name` of `spec`, requested as `table_spec`, over its rows of `grid`.
@@ -450,7 +472,9 @@ pub(super) fn projection(table: &Table, key: &str, names: Option<&[String]>) -> 
         return Ok(Projection::usual(table.columns()));
     };
     let mut indices = Vec::new();
-    for (place, name) in names.iter().enumerate().filter(|(_, name)| *name != STATUS) {
+    // Axes and the status are always written.
+    let is_written = |name: &str| name == STATUS || table.axes().iter().any(|axis| axis.name() == name);
+    for (place, name) in names.iter().enumerate().filter(|(_, name)| !is_written(name)) {
         let key = format!("{key}.columns[{place}]");
         match known.iter().position(|column| column == name) {
             Some(index) if indices.contains(&index) => {

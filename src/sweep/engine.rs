@@ -2,7 +2,7 @@
 //!
 //! All idle compute threads share a part. One of them encodes it, and writer threads publish it while the next parts are computed.
 
-use std::fmt;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
@@ -19,7 +19,6 @@ use crate::dataset::{
     CheckDepth, Concurrency, DatasetError, Folder, Footer, Layout, ManifestTable, Session, State, TableStatistics,
     encode,
 };
-use crate::grid::Quantity;
 use crate::table::{ColumnBuffer, Job, Phase, RunStats, Signal, Stopped, Table};
 
 /// The result of a run.
@@ -62,40 +61,20 @@ pub enum RunError {
     /// The sweep has too many parts for shards.
     #[error(transparent)]
     Parts(#[from] TooManyParts),
-    /// A row panicked; all other parts are complete.
-    #[error("{defect}\n  help: this is a bug in slipsweep: please report it; {}", match others {
-        0 => "all other parts are finished".to_owned(),
-        _ => format!("{others} more parts have such a row; all others are finished"),
-    })]
-    Defect { defect: Defect, others: usize },
+    /// A part panicked: a defect of the program. All other parts are complete.
+    #[error(
+        "{table}: part {part}, rows {} to {}, panicked: {message}\n  help: this is a bug in slipsweep: please report it; {}",
+        rows.start,
+        rows.end,
+        match others {
+            0 => "all other parts are finished".to_owned(),
+            _ => format!("{others} more parts panicked; all others are finished"),
+        }
+    )]
+    Panic { table: String, part: u64, rows: Range<u64>, message: String, others: usize },
     /// The run was stopped on request.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-}
-
-/// A row that panicked: a defect of the program.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Defect {
-    /// The table.
-    pub table: String,
-    /// The global row number; several rows if no single row panics alone.
-    pub rows: Range<u64>,
-    /// The axes of the table at the first of them.
-    pub axes: Vec<(&'static str, f64)>,
-    /// The panic message.
-    pub message: String,
-}
-
-impl fmt::Display for Defect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Defect { table, rows, axes, message } = self;
-        match rows.end - rows.start {
-            1 => write!(f, "{table}: row {} panicked: {message}\n  at ", rows.start)?,
-            _ => write!(f, "{table}: rows {} to {} panicked: {message}\n  beginning at ", rows.start, rows.end)?,
-        }
-        let axes: Vec<String> = axes.iter().map(|(name, value)| format!("{name} = {value:?}")).collect();
-        f.write_str(&axes.join(", "))
-    }
 }
 
 /// Runs `sweep` on `threads` threads (0: one for each processor) into `folder`, and keeps existing intact parts. No other run may use the
@@ -103,7 +82,7 @@ impl fmt::Display for Defect {
 ///
 /// # Errors
 ///
-/// A dataset that cannot be written, threads that cannot be started, a row that panicked, or a stop on request.
+/// A dataset that cannot be written, threads that cannot be started, a part that panicked, or a stop on request.
 pub fn run(sweep: &Sweep, folder: &Folder, threads: usize, signal: &Signal) -> Result<Outcome, RunError> {
     run_in(sweep, folder, (Shard::WHOLE, Concurrency::Alone), threads, signal)
 }
@@ -138,7 +117,7 @@ fn run_in(
     let session = folder.open(&plan.manifest(sweep), company).map_err(|error| sweep.explain(error))?;
     let pool = pool(threads)?;
     let optimum_cache = sweep.optimum_cache();
-    let run = Run { folder, session: &session, pool: &pool, signal, failures: Failures::default() };
+    let run = Run { folder, session: &session, pool: &pool, signal, failure: Mutex::default() };
     let table_runs: Vec<TableRun<'_>> = (sweep.requests.iter().zip(&plan.tables))
         .zip(&optimum_cache)
         .map(|((request, table), optimum_cache)| TableRun {
@@ -148,6 +127,7 @@ fn run_in(
             job: sweep.job(request, optimum_cache, signal),
             layout: Layout::new(request.table, &request.projection, &sweep.grid),
             statistics: Mutex::default(),
+            panics: Mutex::default(),
         })
         .collect();
 
@@ -170,8 +150,10 @@ fn run_in(
         signal.enter(Phase::Writing);
         Ok::<(), RunError>(())
     })?;
+    locked(&run.failure).take().map_or(Ok(()), Err)?;
+    session.check()?;
+    first_panic(&table_runs)?;
     outcome.statistics = table_runs.into_iter().map(|table_run| content(table_run.statistics)).collect();
-    run.failures.into_result(&plan, || session.check())?;
     Ok(outcome)
 }
 
@@ -194,8 +176,7 @@ const MAX_BUFFER_BYTES: u64 = 1 << 27;
 /// Writer threads. Chosen: while one waits for the disk, the other writes.
 pub(super) const WRITERS: usize = 2;
 
-/// Computes the parts `numbers` of a table, and passes number and buffer of each to `take` in any order. For a part with a row that panics
-/// it passes that row.
+/// Computes the parts `numbers` of a table, and passes number and buffer of each to `take` in any order, or the message of its panic.
 ///
 /// One part more than there are threads is in progress, so that no thread waits for the end of a part. Large parts on many threads are limited
 /// by `MAX_BUFFER_BYTES`.
@@ -209,7 +190,7 @@ pub fn compute(
     job: &Job<'_>,
     parts: &ManifestTable,
     numbers: impl Iterator<Item = u64>,
-    take: impl Fn(u64, Result<&ColumnBuffer, Defect>) + Sync,
+    take: impl Fn(u64, Result<&ColumnBuffer, String>) + Sync,
 ) -> Result<RunStats, Stopped> {
     let (give_back, free) = channel();
     let columns = job.projection.indices().len();
@@ -228,13 +209,12 @@ pub fn compute(
             }
             let (give_back, result, take) = (give_back.clone(), &result, &take);
             scope.spawn(move |_| {
-                let rows = parts.rows_of(number);
-                let computed = match attempt(table, job, rows.clone(), &mut buffer) {
+                let computed = match attempt(table, job, parts.rows_of(number), &mut buffer) {
                     Ok(computed) => computed
                         .and_then(|work| job.signal.check().map(|()| work))
                         .inspect(|_| take(number, Ok(&buffer))),
                     Err(message) => {
-                        take(number, Err(culprit(table, job, rows, message)));
+                        take(number, Err(message));
                         Ok(RunStats::default())
                     }
                 };
@@ -263,35 +243,22 @@ fn attempt(
     })
 }
 
-/// The row among `rows` that panics with `message`, found by bisection: any rows can be computed alone.
-fn culprit(table: &Table, job: &Job<'_>, mut rows: Range<u64>, mut message: String) -> Defect {
-    let mut buffer = ColumnBuffer::new(job.projection.indices().len());
-    while rows.end - rows.start > 1 {
-        let middle = rows.start + (rows.end - rows.start) / 2;
-        let halves = [rows.start..middle, middle..rows.end];
-        let panics = halves.into_iter().find_map(|half| {
-            let said = attempt(table, job, half.clone(), &mut buffer).err()?;
-            Some((half, said))
-        });
-        let Some((half, said)) = panics else { break };
-        (rows, message) = (half, said);
-    }
-    let point = job.rows.point(rows.start);
-    let axes = Quantity::ALL.into_iter().filter(|axis| table.axes().contains(axis));
-    let axes = axes.map(|axis| (axis.name(), point[axis])).collect();
-    Defect { table: table.name().to_owned(), rows, axes, message }
-}
-
 /// The shared state of the stages of a run.
 struct Run<'a> {
     folder: &'a Folder,
     session: &'a Session,
     pool: &'a ThreadPool,
     signal: &'a Signal,
-    failures: Failures,
+    /// The first failure of any thread.
+    failure: Mutex<Option<RunError>>,
 }
 
 impl Run<'_> {
+    /// Keeps the first failure.
+    fn fail(&self, error: RunError) {
+        locked(&self.failure).get_or_insert(error);
+    }
+
     /// Starts the writer threads, so that no compute thread waits for the disk.
     fn start_writers<'scope, 'a: 'scope>(
         &'scope self,
@@ -302,7 +269,9 @@ impl Run<'_> {
         let next = move || locked(&parts).recv();
         let write = move || {
             while let Ok(part) = next() {
-                self.failures.keep(part.publish());
+                if let Err(error) = part.publish() {
+                    self.fail(error);
+                }
             }
         };
         for write in std::iter::repeat_n(write, WRITERS) {
@@ -321,6 +290,8 @@ struct TableRun<'a> {
     layout: Layout,
     /// The statistics of the parts so far.
     statistics: Mutex<TableStatistics>,
+    /// The messages of the parts that panicked.
+    panics: Mutex<BTreeMap<u64, String>>,
 }
 
 impl<'a> TableRun<'a> {
@@ -343,17 +314,17 @@ impl<'a> TableRun<'a> {
         intact: &[u64],
         to_writers: &SyncSender<EncodedPart<'a>>,
     ) -> Result<(TableOutcome, RunStats), RunError> {
-        let Run { pool, signal, failures, .. } = self.run;
+        let Run { pool, signal, failure, .. } = self.run;
         let mut done = TableOutcome { kept: intact.len() as u64, ..TableOutcome::default() };
         let missing = shard_parts.iter().cloned().flatten().filter(|number| intact.binary_search(number).is_err());
         let missing = missing.filter(|&number| self.is_missing(number, &mut done));
-        let wanted = missing.take_while(|_| failures.is_empty() && signal.check().is_ok());
+        let wanted = missing.take_while(|_| locked(failure).is_none() && signal.check().is_ok());
         let take =
-            |number, buffer: Result<&ColumnBuffer, Defect>| match buffer.map(|buffer| self.encode(number, buffer)) {
+            |number, buffer: Result<&ColumnBuffer, String>| match buffer.map(|buffer| self.encode(number, buffer)) {
                 // The receiver exists as long as a sender.
                 Ok(Ok(bytes)) => _ = to_writers.send(EncodedPart { table_run: self, number, bytes }),
-                Ok(Err(error)) => failures.keep(Err(error)),
-                Err(defect) => locked(&failures.defects).push(defect),
+                Ok(Err(error)) => self.run.fail(error),
+                Err(message) => _ = locked(&self.panics).insert(number, message),
             };
         let work = compute(pool, self.definition, &self.job, self.table, wanted, take)?;
         signal.check()?;
@@ -370,7 +341,7 @@ impl<'a> TableRun<'a> {
             Ok(Found::Nothing) => {}
             Ok(Found::Damaged) => done.damaged += 1,
             Err(error) => {
-                self.run.failures.keep(Err(error));
+                self.run.fail(error);
                 return false;
             }
         }
@@ -439,35 +410,16 @@ impl EncodedPart<'_> {
     }
 }
 
-/// The first failure of any thread, and all rows that panic.
-#[derive(Default)]
-struct Failures {
-    first: Mutex<Option<RunError>>,
-    defects: Mutex<Vec<Defect>>,
-}
-
-impl Failures {
-    fn keep(&self, result: Result<(), RunError>) {
-        if let Err(error) = result {
-            locked(&self.first).get_or_insert(error);
+/// The first part that panicked, in the order of tables and parts.
+fn first_panic(table_runs: &[TableRun<'_>]) -> Result<(), RunError> {
+    let panics: usize = table_runs.iter().map(|table_run| locked(&table_run.panics).len()).sum();
+    for TableRun { table, panics: own, .. } in table_runs {
+        if let Some((part, message)) = locked(own).pop_first() {
+            let (table, rows) = (table.name.clone(), table.rows_of(part));
+            return Err(RunError::Panic { table, part, rows, message, others: panics - 1 });
         }
     }
-
-    fn is_empty(&self) -> bool {
-        locked(&self.first).is_none()
-    }
-
-    /// The failure of a run: the first one, else that of `check`, else that of the first defect.
-    fn into_result(self, plan: &Plan, check: impl FnOnce() -> Result<(), DatasetError>) -> Result<(), RunError> {
-        content(self.first).map_or(Ok(()), Err)?;
-        check()?;
-        let mut defects = content(self.defects);
-        // Threads report them in any order.
-        let table = |defect: &Defect| plan.tables.iter().position(|table| table.name == defect.table);
-        defects.sort_by_key(|defect| (table(defect), defect.rows.start));
-        let others = defects.len().saturating_sub(1);
-        defects.into_iter().next().map_or(Ok(()), |defect| Err(RunError::Defect { defect, others }))
-    }
+    Ok(())
 }
 
 /// The content of `mutex`, including a poisoned one.

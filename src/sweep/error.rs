@@ -1,12 +1,13 @@
-//! The error of a spec: place, finding, expectation and help.
+//! The error of a spec: place, finding, expectation and help of each fault.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::{iter, mem};
 
 use super::read;
 use crate::names::{nearest, shown};
 
-/// The error of a spec: its first fault.
+/// The error of a spec: a fault, and others that do not follow from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SpecError {
     /// The file, if there is one.
@@ -21,7 +22,12 @@ pub struct SpecError {
     pub expected: Box<str>,
     /// The help.
     pub help: Box<str>,
+    /// The other faults, at most nine.
+    pub others: Box<[SpecError]>,
 }
+
+/// Greatest number of faults in an error. Chosen: they fit a screen.
+pub const MAX_FAULTS: usize = 10;
 
 /// Greatest length of a key or finding in a message, in characters. Chosen: more than the 1000 of the longest expression.
 const MAX_SHOWN_CHARS: usize = 1200;
@@ -41,22 +47,40 @@ impl SpecError {
             found: found.into(),
             expected: expected.into(),
             help: help.into(),
+            others: Box::default(),
         }
     }
 
-    /// The fault as one of `file`.
+    /// The faults as those of `file`.
     pub fn of(self, file: &Path) -> SpecError {
-        SpecError { file: Some(file.to_owned()), ..self }
+        self.each(|fault| fault.file = Some(file.to_owned()))
     }
 
-    /// The fault with the line of its key in `text`, unless it has one.
+    /// The faults with the lines of their keys in `text`, unless they have some.
     pub fn located(self, text: &str) -> SpecError {
-        SpecError { line: self.line.or_else(|| read::line(text, &self.key)), ..self }
+        self.each(|fault| fault.line = fault.line.or_else(|| read::line(text, &fault.key)))
+    }
+
+    /// These faults, if any, and another.
+    pub fn and(faults: Option<SpecError>, mut other: SpecError) -> SpecError {
+        let Some(mut first) = faults else { return other };
+        let others = mem::take(&mut other.others);
+        let known = Vec::from(mem::take(&mut first.others));
+        first.others = known.into_iter().chain([other]).chain(others).take(MAX_FAULTS - 1).collect();
+        first
+    }
+
+    /// The faults after a `change` of each.
+    pub fn each(mut self, mut change: impl FnMut(&mut SpecError)) -> SpecError {
+        self.others.iter_mut().for_each(&mut change);
+        change(&mut self);
+        self
     }
 }
 
-impl fmt::Display for SpecError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl SpecError {
+    /// Writes this fault alone.
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.file, self.line) {
             (Some(file), Some(line)) => write!(f, "{}:{line}: ", file.display())?,
             (Some(file), None) => write!(f, "{}: ", file.display())?,
@@ -70,7 +94,38 @@ impl fmt::Display for SpecError {
     }
 }
 
+impl fmt::Display for SpecError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut faults: Vec<&SpecError> = iter::once(self).chain(&self.others).collect();
+        // Faults of the whole spec come last.
+        faults.sort_by_key(|fault| fault.line.unwrap_or(usize::MAX));
+        for (place, fault) in faults.into_iter().enumerate() {
+            if place > 0 {
+                f.write_str("\nerror: ")?;
+            }
+            fault.write(f)?;
+        }
+        Ok(())
+    }
+}
+
 impl std::error::Error for SpecError {}
+
+/// The values of independent checks, or the faults of all as one error.
+///
+/// # Errors
+///
+/// The error of any check.
+pub fn all<T>(checks: impl IntoIterator<Item = Result<T, SpecError>>) -> Result<Vec<T>, SpecError> {
+    let (mut values, mut error) = (Vec::new(), None);
+    for check in checks {
+        match check {
+            Ok(value) => values.push(value),
+            Err(fault) => error = Some(SpecError::and(error, fault)),
+        }
+    }
+    error.map_or(Ok(values), Err)
+}
 
 /// The fault at `key` as the result of a check.
 ///

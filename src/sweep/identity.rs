@@ -89,8 +89,12 @@ impl Sweep {
         // An axis is more specific than the order of all axes.
         let keys = new.chain(lost).map(|(key, _)| key.as_str());
         let Some(key) = keys.min_by_key(|key| key.ends_with("axes")) else {
-            return ["the files that it names", "other contents of the same files"].map(str::to_owned);
+            let line = read::line(&self.text, "points").map_or(String::new(), |line| format!(" (line {line})"));
+            return [format!("the file of points{line}"), "other contents of this file".to_owned()];
         };
+        // The accuracy of a table is usually that of the sweep.
+        let own = key.strip_suffix(".rtol").filter(|_| read::value(&self.text, key).is_none());
+        let key = own.filter(|_| read::value(&self.text, RTOL).is_some()).map_or(key, |_| RTOL);
         let value = |sweep: &Sweep, facts: &[(String, String)]| {
             let fact =
                 facts.iter().find(|(known, _)| known == key && !key.contains("axes.")).map(|(_, value)| value.clone());
@@ -98,13 +102,17 @@ impl Sweep {
             value.map_or_else(|| format!("no {key}"), |value| format!("{key} = {}", shown(&value, MAX_SHOWN_CHARS)))
         };
         let [here, there] = [value(self, &here), value(other, &there)];
-        if here == there {
-            return [format!("the values of {key}"), format!("other values of {key}")];
-        }
         let line = read::line(&self.text, key).filter(|_| !here.starts_with("no "));
-        [line.map_or(here.clone(), |line| format!("{here} (line {line})")), there]
+        let line = line.map_or(String::new(), |line| format!(" (line {line})"));
+        if here == there {
+            return [format!("the values of {key}{line}"), format!("other values of {key}")];
+        }
+        [here + &line, there]
     }
 }
+
+/// The key of the accuracy of a sweep.
+const RTOL: &str = "accuracy.rtol";
 
 /// The inputs of a block for the `needed` axes, and for the axes in their expressions and in the condition.
 fn block_facts(block: &Block, needed: &[Quantity], fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {

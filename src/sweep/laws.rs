@@ -92,7 +92,7 @@ pub fn check(key: &str, table: &Table, block: &Block, is_bounded: bool) -> Resul
     }
     if has_with_law(block, Quantity::VelocityCeiling, f64::is_infinite) {
         let what = format!("{law} without a velocity ceiling: faster is always better");
-        return unsupported(key, table, &what, "a finite v_ceiling, such as `v_ceiling = 1000.0`");
+        return unsupported(key, table, &what, "a finite v_ceiling above v_i and v_f, such as { expr = \"10 * v_f\" }");
     }
     if has_with_law(block, Quantity::FrictionCeiling, f64::is_finite) {
         return unsupported(key, table, &format!("a friction ceiling for {law}"), "tau_ceiling = inf");

@@ -28,7 +28,7 @@ pub use check::{Request, Sweep};
 #[cfg(feature = "query")]
 pub(crate) use direct::available_bytes;
 pub use direct::{Direct, Given, RowsError};
-pub use engine::{Defect, Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
+pub use engine::{Outcome, RunError, TableOutcome, compute, pool, run, run_shard};
 pub use error::SpecError;
 pub use estimate::{Estimate, Estimates, estimate};
 pub use laws::friction;

@@ -57,7 +57,7 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
             }
             Cells::Label { .. } => {
                 let error = unknown("points".to_owned(), "axis", &name, &Quantity::ALL.map(Quantity::name));
-                let expected = format!("{}; or a label, a column of text or of numbers in quotes", error.expected);
+                let expected = format!("{}; or a label: text, such as \"S1\", or numbers in quotes", error.expected);
                 let found = format!("{}: {}", path.display(), error.found);
                 return Err(SpecError { found: found.into(), expected: expected.into(), ..error });
             }
@@ -131,7 +131,9 @@ impl Column {
             Cells::Axis(quantity, _) if quantity.words().is_empty() => match cell.parse::<f64>() {
                 Ok(value) => self.push_number(place, value, units)?,
                 Err(_) => {
-                    return self.wrong(place, &format!("`{cell}` is not a number"), "a number such as 0.03 or 1e-3");
+                    let found =
+                        if cell.is_empty() { "an empty cell".to_owned() } else { format!("`{cell}` is not a number") };
+                    return self.wrong(place, &found, "a number with a decimal point, such as 0.03 or 1e-3");
                 }
             },
             Cells::Axis(quantity, values) => {
@@ -160,9 +162,14 @@ impl Column {
     }
 }
 
-/// Reads CSV: a header of names, then one line for each point. Skips empty lines and lines that begin with #.
+/// Reads CSV: a header of names, then one line for each point. Skips lines without values and lines that begin with #.
 fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError> {
-    let text = io::read_to_string(file).map_err(|error| unreadable(path, &error))?;
+    let text = file::text(file).map_err(|error| match error.kind() {
+        io::ErrorKind::InvalidData => {
+            fault(format!("{}: {error}", path.display()), "a CSV file in UTF-8", "save it as \"CSV UTF-8\"")
+        }
+        _ => unreadable(path, &error),
+    })?;
     // Spreadsheets write a byte order mark.
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim).zip(1..);
     let mut lines = lines.filter(|(line, _)| !line.is_empty() && !line.starts_with('#'));
@@ -174,6 +181,10 @@ fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError>
     for (count, (line, number)) in lines.enumerate() {
         check_count(path, count + 1)?;
         let cells = cells_of(&place(number), line)?;
+        // Spreadsheets write empty rows.
+        if cells.len() > 1 && cells.iter().all(|cell| cell.is_empty()) {
+            continue;
+        }
         if cells.len() != columns.len() {
             let found = format!(
                 "{}: the number of values is {}, that of columns {}",
@@ -316,7 +327,8 @@ fn header<'a>(place: &str, names: impl Iterator<Item = &'a str>) -> Result<Vec<C
         }
         if quantity.is_none() && name.contains([';', '\t', '\r']) {
             let found = format!("{place}: columns or lines that end with ; or a tab, in `{name}`");
-            return Err(fault(found, "columns that end with commas, lines with newlines", "save it as such CSV"));
+            let help = "save it as CSV with commas and decimal points; commas in numbers are not decimal points";
+            return Err(fault(found, "columns that end with commas, lines with newlines", help));
         }
         if quantity.is_none() && taken.iter().any(|taken| taken.eq_ignore_ascii_case(name)) {
             let found = format!("{place}: the label `{name}` has the name of a column of a table");

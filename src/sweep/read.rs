@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{SpecError, unknown};
+use super::error::{MAX_FAULTS, SpecError, unknown};
 use super::spec::Spec;
 use crate::grid::Quantity;
 
@@ -14,7 +14,7 @@ impl Spec {
     ///
     /// # Errors
     ///
-    /// The syntax error, an unknown or missing key, or a value of the wrong type.
+    /// The syntax error, or unknown and missing keys and values of the wrong type.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
         let document = DeTable::parse(text).map_err(|error| {
             let help = "put text and expressions in \"quotes\", close brackets, write decimals with a point, commas between values, and each key once";
@@ -22,12 +22,45 @@ impl Spec {
                 SpecError::new("", format!("not TOML: {}", error.message()), "key = value, [table] or # comment", help);
             SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }
         })?;
-        toml::from_str(text).map_err(|error: toml::de::Error| {
+        let document = document.into_inner();
+        let (mut rest, mut known) = (text.to_owned(), None);
+        loop {
+            let error: toml::de::Error = match (toml::from_str(&rest), known) {
+                (Ok(spec), None) => return Ok(spec),
+                (Ok(_), Some(faults)) => return Err(faults),
+                // Its entry may be the blank one.
+                (Err(error), Some(faults)) if is_missing(&error) => return Err(faults),
+                (Err(error), faults) => {
+                    known = faults;
+                    error
+                }
+            };
             let span = error.span().unwrap_or_default();
-            let key = key_at(&DeValue::Table(document.into_inner()), "", span.start).unwrap_or_default();
-            SpecError { line: Some(line_of(text, span.start)), ..fault(text, span, key, error.message()) }
-        })
+            let key = key_at(&document, "", span.start).unwrap_or_default();
+            let entry = find(&document, &key).filter(|_| !is_missing(&error));
+            let entry = entry.map(|entry| entry.start..entry.value.span().end);
+            let fault = SpecError { line: Some(line_of(text, span.start)), ..fault(text, span, key, error.message()) };
+            let faults = SpecError::and(known, fault);
+            // Without the entry other faults show, at the same places.
+            if !entry.is_some_and(|entry| blank(&mut rest, entry)) || faults.others.len() + 1 == MAX_FAULTS {
+                return Err(faults);
+            }
+            known = Some(faults);
+        }
     }
+}
+
+/// Whether an error is that of a missing key.
+fn is_missing(error: &toml::de::Error) -> bool {
+    error.message().starts_with("missing field ")
+}
+
+/// Replaces the characters of `entry` by blanks, except for ends of lines. Returns whether `text` is TOML then.
+fn blank(text: &mut String, entry: Range<usize>) -> bool {
+    let Some(written) = text.get(entry.clone()) else { return false };
+    let blanks: String = written.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }).collect();
+    text.replace_range(entry, &blanks);
+    DeTable::parse(text).is_ok()
 }
 
 /// The help for text in place of a number.
@@ -65,22 +98,23 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
     SpecError::new(key, format!("found {found}"), expected, help)
 }
 
-/// The key of the innermost value below `value`, at `key`, whose text contains a byte.
-fn key_at(value: &DeValue<'_>, key: &str, byte: usize) -> Option<String> {
-    let child = |below: String, start: Range<usize>, value: &Spanned<DeValue<'_>>| {
-        let inner = key_at(value.get_ref(), &below, byte);
-        inner.or_else(|| (start.contains(&byte) || value.span().contains(&byte)).then_some(below))
-    };
+/// The key of the innermost value below `table`, at `key`, whose text contains a byte.
+fn key_at(table: &DeTable<'_>, key: &str, byte: usize) -> Option<String> {
     let dot = if key.is_empty() { "" } else { "." };
-    match value {
-        DeValue::Table(table) => {
-            table.iter().find_map(|(name, value)| child(format!("{key}{dot}{}", name.get_ref()), name.span(), value))
-        }
-        DeValue::Array(items) => {
-            items.iter().enumerate().find_map(|(index, value)| child(format!("{key}[{index}]"), value.span(), value))
-        }
+    table.iter().find_map(|(name, value)| key_of(format!("{key}{dot}{}", name.get_ref()), name.span(), value, byte))
+}
+
+/// `key`, or that of the innermost value below it, if its name or value contains a byte.
+fn key_of(key: String, name: Range<usize>, value: &Spanned<DeValue<'_>>, byte: usize) -> Option<String> {
+    let inner = match value.get_ref() {
+        DeValue::Table(table) => key_at(table, &key, byte),
+        DeValue::Array(items) => items
+            .iter()
+            .enumerate()
+            .find_map(|(index, item)| key_of(format!("{key}[{index}]"), item.span(), item, byte)),
         _ => None,
-    }
+    };
+    inner.or_else(|| (name.contains(&byte) || value.span().contains(&byte)).then_some(key))
 }
 
 /// The line of `key` (as in `axes.v_i[2]`), or of its longest existing prefix.

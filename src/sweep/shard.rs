@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use super::check::Sweep;
 use super::plan::Plan;
-use crate::grid::mixed;
+use crate::grid::{SPLIT_MIX_INCREMENT, mixed};
 
 /// The error of a sweep with too many parts for shards: every shard counts all parts, and lists a folder with as many files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -145,8 +145,7 @@ fn first_numbers(sweep: &Sweep, plan: &Plan) -> Vec<u64> {
 /// Parts are dealt in rounds, one part to each shard, so that the shards have equally many parts of each table, up to one. Each round begins with
 /// another shard: otherwise periodic costs along a table would meet in one shard whenever their period divides the number of shards.
 fn shard_of(number: u64, count: u64) -> u64 {
-    // The increment and the finaliser of SplitMix64.
-    let hash = mixed((number / count).wrapping_add(0x9e37_79b9_7f4a_7c15));
+    let hash = mixed((number / count).wrapping_add(SPLIT_MIX_INCREMENT));
     (hash % count + number % count) % count
 }
 

@@ -122,12 +122,23 @@ pub fn doubtful_scales(model: &ModelSpec) -> Vec<SpecError> {
 /// Velocity in m/s above which SI values are probably scaled values. Chosen: brakes slide at up to 50 m/s, faults at some 10 m/s.
 const MAX_PLAUSIBLE_VELOCITY: f64 = 50.0;
 
+/// Friction ceiling, relative to `mu_0 sigma`, below which SI values are probably coefficients of friction. Chosen: friction is close to 1 in these units.
+const MIN_PLAUSIBLE_CEILING: f64 = 0.01;
+
 /// The warning on `axis` at `key` if values are probably in other units, or outside the physical domain.
 pub fn doubtful_axis(key: String, units: &Units, axis: &Axis) -> Option<SpecError> {
     let (quantity, unit) = (axis.quantity, axis.quantity.unit(Scale::Model));
     let is_velocity =
         matches!(quantity, Quantity::InitialVelocity | Quantity::FinalVelocity | Quantity::VelocityCeiling);
-    let [_, greatest] = ends(axis);
+    let [least, greatest] = ends(axis);
+    if *units != Units::Scaled
+        && quantity == Quantity::FrictionCeiling
+        && units.scaled(unit, least) < MIN_PLAUSIBLE_CEILING
+    {
+        let expected = "a stress in Pa, because of `units = \"si\"`";
+        let help = "multiply a coefficient of friction by normal_stress";
+        return Some(SpecError::new(key, format!("{least:?} Pa is unusually low"), expected, help));
+    }
     if *units != Units::Scaled && is_velocity && greatest > MAX_PLAUSIBLE_VELOCITY {
         let expected = "velocities in m/s, because of `units = \"si\"`";
         return Some(SpecError::new(key, format!("{greatest:?} m/s is unusually fast"), expected, PROBABLY_SCALED));

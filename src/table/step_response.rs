@@ -27,7 +27,7 @@ impl Row {
 }
 
 fields! { Row:
-    v_peak "v_0" "greatest velocity after v first reaches v_f, at least v_f; null if undecided"
+    v_peak "v_0" "greatest velocity after v first reaches v_f, at least v_f; null if undecided or not known to rtol"
         => |row| row.of_solution(|response| response.v_peak);
     v_trough "v_0" "least velocity after v first reaches v_f, at most v_f; 0 if it underflows; null if undecided or not known to rtol"
         => |row| row.of_solution(|response| response.v_trough);

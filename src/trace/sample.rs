@@ -1,5 +1,6 @@
 //! The sampling of a motion: the fewest points for linear interpolation, or equally spaced points.
 
+use crate::numerics::golden_section::least;
 use crate::numerics::root::crossing;
 use crate::protocol::{Moment, Motion};
 
@@ -159,33 +160,10 @@ impl Samples {
     fn greatest(&self, motion: &dyn Motion, of: impl Fn(&Moment) -> f64) -> f64 {
         let order = |i: &usize, j: &usize| of(&self.samples[*i].moment).total_cmp(&of(&self.samples[*j].moment));
         let top = (0..self.samples.len()).max_by(order).unwrap_or(0);
-        let mut best = of(&self.samples[top].moment);
-        let value = |s: f64| of(&motion.at(s));
-        let (mut low, mut high) =
-            (self.samples[top.saturating_sub(1)].s, self.samples[(top + 1).min(self.samples.len() - 1)].s);
-        let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-        let (mut at_left, mut at_right) = (value(left), value(right));
-        for _ in 0..SECTIONS {
-            best = best.max(at_left).max(at_right);
-            if at_left > at_right {
-                (high, right, at_right) = (right, left, at_left);
-                left = high - GOLDEN * (high - low);
-                at_left = value(left);
-            } else {
-                (low, left, at_left) = (left, right, at_right);
-                right = low + GOLDEN * (high - low);
-                at_right = value(right);
-            }
-        }
-        best
+        let ends = (self.samples[top.saturating_sub(1)].s, self.samples[(top + 1).min(self.samples.len() - 1)].s);
+        (-least(|s| -of(&motion.at(s)), ends).1).max(of(&self.samples[top].moment))
     }
 }
-
-/// Ratio of a golden section, `(sqrt 5 - 1)/2`.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
-
-/// Number of golden sections, which shrink an interval by `1e-8`: a smooth maximum is flat within rounding there. Derived.
-const SECTIONS: u32 = 40;
 
 /// The moments at `count >= 2` equally spaced times from 0 to `t_f`. `None` as for [`Samples::of`].
 pub fn spaced(motion: &dyn Motion, count: usize) -> Option<Vec<Moment>> {

@@ -1,6 +1,7 @@
 //! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
 use crate::model::{Friction, Law, StateLaw};
+use crate::numerics::golden_section;
 use crate::numerics::radau::{NODES, Nodes, radau};
 use crate::protocol::{Moment, Motion, SpringBlock};
 
@@ -211,7 +212,7 @@ impl Followed {
     /// Time and value of the maximum of the velocity (minimum for `sign` -1) about a sample: the vertex of a narrow parabola.
     pub fn extremum(&self, index: usize, sign: f64) -> (f64, f64) {
         let (low, high) = (self.samples[index - 1].0, self.samples[index + 1].0);
-        let middle = golden(&|s| -sign * self.at(s).v, low, high).0;
+        let middle = golden_section::least(|s| -sign * self.at(s).v, (low, high)).0;
         let h = 1e-3 * (high - low);
         let [before, here, after] = [middle - h, middle, middle + h].map(|s| self.at(s));
         let (rise, fall) = ((here.v - before.v) / (here.t - before.t), (after.v - here.v) / (after.t - here.t));
@@ -233,7 +234,7 @@ impl Followed {
         minima.sort_by(|&i, &j| values[i].total_cmp(&values[j]));
         let around = |&i: &usize| {
             let [from, to] = [i.saturating_sub(1), (i + 1).min(end)].map(|index| self.samples[index].0);
-            golden(&|s| f(&self.motion.at(s)), from, to).1.min(values[i])
+            golden_section::least(|s| f(&self.motion.at(s)), (from, to)).1.min(values[i])
         };
         minima.iter().take(REFINED_MINIMA).map(around).fold(f64::NAN, f64::min)
     }
@@ -287,18 +288,7 @@ pub fn lowest(f: &dyn Fn(f64) -> f64, (low, high): (f64, f64)) -> f64 {
     let place = |index: u32| low + (high - low) * f64::from(index.min(SCAN_STEPS)) / f64::from(SCAN_STEPS);
     let values = (0..=SCAN_STEPS).map(|index| (index, f(place(index))));
     let (index, least) = values.min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((0, f64::NAN));
-    golden(f, place(index.saturating_sub(1)), place(index + 1)).1.min(least)
-}
-
-/// Position and value of the minimum in an interval that contains one.
-fn golden(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
-    let fraction = 0.5 * (5.0_f64.sqrt() - 1.0);
-    for _ in 0..80 {
-        let (left, right) = (high - fraction * (high - low), low + fraction * (high - low));
-        if f(left) < f(right) { high = right } else { low = left }
-    }
-    let middle = 0.5 * (low + high);
-    (middle, f(middle))
+    golden_section::least(f, (place(index.saturating_sub(1)), place(index + 1))).1.min(least)
 }
 
 /// Friction by its definition.

@@ -2,15 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::dataset::{CheckDepth, Folder, Manifest, ManifestTable, PROGRAM, Row, State, frame};
-
-/// Steele, Lea and Flood's SplitMix64 (OOPSLA 2014): a counter, scrambled.
-fn next(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
+use crate::dataset::{CheckDepth, Folder, Manifest, ManifestTable, OTHER_SWEEP, Row, State, frame};
+use crate::grid::{SPLIT_MIX_INCREMENT, mixed};
 
 /// `count` different row numbers below `rows`, ascending (Floyd's sampling); all if there are no more.
 fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
@@ -20,7 +13,8 @@ fn choose(rows: u64, count: u64, seed: u64) -> BTreeSet<u64> {
     let mut state = seed;
     let mut chosen = BTreeSet::new();
     for last in rows - count..rows {
-        let row = next(&mut state) % (last + 1);
+        state = state.wrapping_add(SPLIT_MIX_INCREMENT);
+        let row = mixed(state) % (last + 1);
         chosen.insert(if chosen.contains(&row) { last } else { row });
     }
     chosen
@@ -51,9 +45,8 @@ pub fn rows(folder: &Folder, manifest: &Manifest, table: &ManifestTable, count: 
         let read = match folder.state(manifest, &table.name, part, CheckDepth::Footer) {
             // The numbers of an edited part are compared, too.
             State::Damaged { why } => frame::read_all(&path).map_err(|_| damaged(why)),
-            State::There { .. } | State::Foreign { what: PROGRAM, .. } => {
-                frame::read_all(&path).map_err(|error| damaged(error.reason))
-            }
+            State::There { .. } => frame::read_all(&path).map_err(|error| damaged(error.reason)),
+            State::Foreign { why } if why != OTHER_SWEEP => frame::read_all(&path).map_err(|_| State::Foreign { why }),
             State::Missing => {
                 sample.missing += inside.count() as u64;
                 continue;

@@ -57,6 +57,8 @@ fn batches_are_the_parts() {
 fn a_wrong_spec_states_where() {
     let error = Sweep::parse("name = \"x\"\n[axes]\nv_i = 1.0\n[tables.optimum]\n", Path::new(".")).err();
     let message = "line 3: axes.v_i: 1.0 is out of range\n  expected: 1 < v_i <= 1e12\n  help: velocities are in units of v_0, above 1; \
-                   for m/s, add `units = \"si\"` and the scales to [model]";
+                   for m/s, add `units = \"si\"` and the scales to [model]\n\
+                   error: line 4: tables.optimum: unknown table `optimum`\n  expected: gap, best_cubic, optimal, feedback, \
+                   crossover, shortcut, stability, step_response, compliant, regularised\n  help: did you mean `optimal`?";
     assert_eq!(error.expect("is refused").to_string(), message);
 }

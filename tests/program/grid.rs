@@ -223,6 +223,35 @@ fn rows_of_random_blocks_are_those_of_nested_loops() {
 }
 
 #[test]
+fn rows_of_several_chunks_are_those_of_nested_loops() {
+    // Chunks of a condition have 65,536 combinations.
+    let lengths = [(Quantity::Time, 300), (Quantity::A, 2), (Quantity::FinalVelocity, 250)];
+    let factor = |(quantity, length): (Quantity, u32)| {
+        let values = Values::List((1..=length).map(f64::from).collect());
+        Factor { axes: vec![Axis { quantity, scale: Scale::Model, values }], ..Factor::default() }
+    };
+    let axes = lengths.map(|(quantity, _)| quantity);
+    for (text, holds) in [
+        ("t_f < v_f", (|x| x[0] < x[2]) as fn([f64; 3]) -> bool),
+        ("t_f * a * v_f > 30 and t_f <> 7", |x| x[0] * x[1] * x[2] > 30.0 && x[0] != 7.0),
+        ("v_f = 250 and t_f > 250", |x| x[2] == 250.0 && x[0] > 250.0),
+    ] {
+        let condition = Expression::condition(text, &axes, None).expect("is a condition");
+        let block = Block { factors: lengths.map(factor).to_vec(), condition: Some(condition), ..Block::default() };
+        let grid = Grid { blocks: vec![Arc::new(block)], ..Grid::default() };
+        let rows = grid.project(&axes).expect("is small");
+        let all = (1..=300)
+            .flat_map(|t_f| [1, 2].map(|a| [t_f, a]))
+            .flat_map(|[t_f, a]| (1..=250).map(move |v_f| [t_f, a, v_f]));
+        let expected: Vec<[f64; 3]> = all.map(|x| x.map(f64::from)).filter(|x| holds(*x)).collect();
+        assert_eq!(rows.rows(), expected.len() as u64, "{text}");
+        for (row, expected) in expected.iter().enumerate().step_by(11) {
+            assert_eq!(axes.map(|axis| rows.point(row as u64)[axis]), *expected, "{text}: {row}");
+        }
+    }
+}
+
+#[test]
 fn optimal_problems_of_random_blocks_are_distinguished() {
     let mut random = Random(2);
     for case in 0..200 {
@@ -675,5 +704,5 @@ fn regress_files_of_points_that_are_not_quite_csv() {
         assert!(csv(content).starts_with("cases.csv:1: columns or lines that end with ; or a tab"));
     }
     assert_eq!(csv(b",t_f,a\n0,1,2\n"), "cases.csv:1: column 1 has no name");
-    assert_eq!(csv(b"\xff\xfet\0_\0f\0"), "cases.csv: stream did not contain valid UTF-8");
+    assert_eq!(csv(b"\xff\xfet\0_\0f\0"), "cases.csv: line 1 is not UTF-8");
 }

@@ -311,3 +311,30 @@ fn a_ceiling_may_be_below_the_first_velocity() {
         assert!(below.optimum.strategy == Strategy::WaitJerk || law == StateLaw::Prz, "{below:?}");
     }
 }
+
+/// Protocols of three arcs of constant velocity have a work of -94.98 and of -15.36: they jump down to states where `T < 0`, and rise faster than at
+/// `v = 1`.
+#[test]
+fn regress_a_fast_rise_from_a_feasible_weak_state_is_no_proof() {
+    for (t_f, a, b, v_i, v_f, ceiling) in [
+        (
+            0.22154159550042463,
+            0.007881882680759676,
+            0.15720117994517083,
+            15.795505468276955,
+            22.68871017785537,
+            6974.596584997595,
+        ),
+        (
+            0.05651918084192962,
+            0.010647952918719584,
+            0.1695164451243126,
+            3.8292430741976533,
+            88.63766691243711,
+            3290.4534525264035,
+        ),
+    ] {
+        let found = solved(&(StateLaw::Slip, transition(a, b, v_i, v_f), t_f, ceiling));
+        assert!(found.status == Status::Unproven && found.value.is_some(), "{found:?}");
+    }
+}

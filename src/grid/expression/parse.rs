@@ -46,6 +46,17 @@ impl Fault {
         Fault { position, found: found.into(), expected: expected.into(), help: help.into() }
     }
 
+    /// The fault with the position of its sign in `text`, or of the end, unless it has one.
+    fn located(self, text: &str) -> Fault {
+        let sign = self.found.strip_prefix("unexpected `").and_then(|sign| sign.strip_suffix('`'));
+        let place = match sign {
+            Some(sign) => text.find(sign),
+            None => self.found.ends_with(END).then_some(text.len()),
+        };
+        let position = || Some(text[..place?].chars().count() as u64 + 1);
+        Fault { position: self.position.or_else(position), ..self }
+    }
+
     /// The fault of a name that is not in `known`.
     fn unknown(position: Option<u64>, what: &str, name: &str, known: &[&str]) -> Fault {
         let meant = nearest(name, known.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
@@ -116,6 +127,10 @@ enum Kind {
 }
 
 fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
+    parse(text, axes, points).map_err(|fault| fault.located(text))
+}
+
+fn parse(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
     if text.len() > MAX_BYTES {
         let found = format!("{} characters", text.chars().count());
         return Err(Fault::new(None, found, format!("at most {MAX_BYTES}"), "shorten the expression"));
@@ -150,10 +165,13 @@ fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expre
     Ok((Expression { program: compiler.program }, kind))
 }
 
+/// The end of an expression, in messages.
+const END: &str = "the end of the expression";
+
 /// The message of the parser, simplified.
 fn syntax(error: &ParserError) -> Fault {
     let message = error.to_string().replace("sql parser error: ", "").replace("Expected: ", "expected ");
-    let message = message.replace("found: ", "found ").replace("EOF", "the end of the expression");
+    let message = message.replace("found: ", "found ").replace("EOF", END);
     let (found, column) = message.split_once(" at Line: 1, Column: ").unwrap_or((&message, ""));
     Fault::new(column.trim().parse().ok(), found, GRAMMAR, "correct the expression")
 }

@@ -28,13 +28,15 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     if let (Some(x), Some(y)) = (x, y)
         && x == y
     {
-        return Err(PlotError::SameAxes { axis: x.to_owned() });
+        return Err(PlotError::same_axes(x));
     }
     if let Some(x) = x.filter(|x| filtered.axis(x).is_some_and(|axis| !axis.varies() && !axis.infinite))
         && !choice.varying.is_empty()
     {
-        let varying = choice.varying.iter().map(|axis| axis.name.clone()).collect();
-        return Err(PlotError::Constant { axis: x.to_owned(), varying });
+        let varying = choice.varying.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", ");
+        return Err(PlotError::Refused(format!(
+            "--x {x}: all rows have the same value\n  expected: one of {varying}\n  help: choose an axis that varies"
+        )));
     }
     if let Some(y) = y.filter(is_axis) {
         let x = x.map(str::to_owned).or_else(|| choice.find(defaults.x, Some(y), 2)).or_else(|| choice.longest());
@@ -49,11 +51,23 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
         return choice.map(x, y);
     }
     if let Some(column) = wants_map.filter(|column| !filtered.is_label(column)) {
+        if y.is_some() {
+            let axes = choice.varying.iter().map(|axis| axis.name.as_str());
+            let among: Vec<&str> = axes.filter(|axis| Some(*axis) != x).chain(filtered.label_columns()).collect();
+            return Err(PlotError::Refused(format!(
+                "--color {column} is a result, which colours maps\n  expected: an axis or a label, since --y draws lines: {}\n  \
+                 help: remove --color",
+                among.join(", ")
+            )));
+        }
         return Err(choice.no_map(column));
     }
     let colour = colour.filter(|colour| !filtered.is_label(colour));
     if let Some(y) = y.filter(|y| !filtered.words(y).is_empty()) {
-        return Err(PlotError::Words { column: y.to_owned() });
+        return Err(PlotError::Refused(format!(
+            "--y {y}: words make no line\n  expected: a column of numbers\n  help: in a map over two axes, --color {y} shows them; \
+             `slipsweep query` lists them"
+        )));
     }
     let of_at_least = |values: usize| choice.find(defaults.x, colour, values);
     let preferred = || of_at_least(defaults.least_map.min(MANY_VALUES)).or_else(|| of_at_least(3));
@@ -89,7 +103,11 @@ impl<'a> Choice<'a> {
     ) -> Result<Choice<'a>, PlotError> {
         for (argument, axis) in [("--x", &request.x), ("--y", &request.y)] {
             if let Some(label) = axis.clone().filter(|axis| filtered.is_label(axis)) {
-                return Err(PlotError::Label { argument, label, line: defaults.line(filtered) });
+                return Err(PlotError::Refused(format!(
+                    "{argument} {label}: a label is no axis\n  expected: a column of numbers\n  help: --y {} draws a line for each {label}; \
+                     --where \"{label}=…\" selects one",
+                    defaults.line(filtered)
+                )));
             }
         }
         if let Some(x) = &request.x {
@@ -117,7 +135,8 @@ impl<'a> Choice<'a> {
     }
 
     fn one_row(&self) -> PlotError {
-        PlotError::OneRow { table: self.filtered.table.clone() }
+        let found = format!("the table `{}` has a single matching row, which makes no picture", self.filtered.table);
+        PlotError::Refused(format!("{found}\n  help: `slipsweep head` shows it"))
     }
 
     /// The error if no two axes make a map.
@@ -130,9 +149,13 @@ impl<'a> Choice<'a> {
             let label = filtered.label_columns().join(", ");
             found.push_str(&format!("; the label {label} determines {}", of_points.join(", ")));
         }
-        let are_words = !filtered.words(column).is_empty();
-        let line = self.defaults.line(filtered);
-        PlotError::NoMap { table: filtered.table.clone(), column: column.to_owned(), found, line, are_words }
+        let words = if filtered.words(column).is_empty() { "" } else { "; `slipsweep query` lists the words" };
+        PlotError::Refused(format!(
+            "--color {column}: a map needs two axes of several values, which the table `{}` does not have\n  found: {found}\n  \
+             help: --y {} draws lines{words}",
+            filtered.table,
+            self.defaults.line(filtered)
+        ))
     }
 
     /// The axes of a map, if two are long enough.

@@ -38,6 +38,15 @@ pub struct Condition {
     pub values: Vec<String>,
 }
 
+/// The error of a text that is not a condition.
+fn no_condition(text: &str) -> PlotError {
+    PlotError::Refused(format!(
+        "--where {}: not a condition\n  expected: COLUMN=VALUE, or <, >, <=, >= or != between them, or COLUMN in (VALUE, VALUE); several of \
+         them separated by commas\n  help: such as --where \"a=0.03, v_f>=10\"",
+        text.trim()
+    ))
+}
+
 impl Condition {
     /// The conditions in `text`, separated by commas or `and` in any case.
     ///
@@ -78,14 +87,14 @@ impl Condition {
             }
         }
         if quote.is_some() {
-            return Err(PlotError::Condition { text: text.trim().to_owned() });
+            return Err(no_condition(text));
         }
         all.push(Condition::one(&text[from..])?);
         Ok(all)
     }
 
     fn one(text: &str) -> Result<Condition, PlotError> {
-        let wrong = || PlotError::Condition { text: text.trim().to_owned() };
+        let wrong = || no_condition(text);
         // The first sign; of several at one position, the longest, which comes first in `SIGNS`.
         let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
         // In ASCII alone, places are those of the text.
@@ -340,7 +349,7 @@ mod tests {
             "a in (1,)",
             "a='x",
         ] {
-            assert!(matches!(Condition::all(text), Err(PlotError::Condition { .. })), "{text}");
+            assert!(matches!(Condition::all(text), Err(PlotError::Refused(_))), "{text}");
         }
     }
 }

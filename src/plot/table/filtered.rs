@@ -129,9 +129,9 @@ impl FilteredTable {
         name: &str,
         conditions: &[Condition],
     ) -> Result<FilteredTable, PlotError> {
-        let table = manifest.table(name).ok_or_else(|| PlotError::NoTable {
-            name: name.to_owned(),
-            found: manifest.tables.iter().map(|table| table.name.clone()).collect(),
+        let table = manifest.table(name).ok_or_else(|| {
+            let known: Vec<String> = manifest.tables.iter().map(|table| table.name.clone()).collect();
+            PlotError::unknown("the dataset has no table", name, &known)
         })?;
         let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
@@ -154,15 +154,21 @@ impl FilteredTable {
             filtered.check("--where", "column", &condition.column)?;
             let is_number = filtered.heading(&condition.column).is_some_and(|heading| heading.is_number);
             if is_number && !condition.is_of_number() {
-                return Err(PlotError::NotNumber { text: condition.shown(), column: condition.column.clone() });
+                return Err(PlotError::Refused(format!(
+                    "--where {}: the column `{}` has numbers\n  expected: a number without a unit, such as 0.03, 1e-6 or inf\n  help: correct \
+                     the value",
+                    condition.shown(),
+                    condition.column
+                )));
             }
             let columns = table::find(name).map_or(&[][..], |table| table.columns());
             let kind = columns.iter().find(|column| column.name == condition.column).map(|column| column.kind);
             if let Some(Kind::Label(words)) = kind
                 && let Some(word) = condition.values.iter().find(|word| !words.contains(&word.as_str()))
             {
-                let (text, column) = (condition.shown(), condition.column.clone());
-                return Err(PlotError::NotWord { text, column, word: word.clone(), words });
+                let found = format!("--where {}: `{}` is never `{word}`", condition.shown(), condition.column);
+                let (expected, help) = (words.join(", "), names::hint(word, words.iter().copied()));
+                return Err(PlotError::Refused(format!("{found}\n  expected: {expected}\n  help: {help}")));
             }
         }
         let known = table::find(name).map_or(&[][..], |table| table.axes());
@@ -256,13 +262,24 @@ impl FilteredTable {
         Ok(frame::read_where(part, names, &may_hold).map_err(ReadError::from)?)
     }
 
-    /// The label of a row in markup, from the cells of the columns of labels.
+    /// The label of a row in markup, from the cells of the columns of labels; for empty cells, as in `no material`.
     pub fn label(&self, cells: &[f64]) -> String {
         let word = |((_, words), cell): (&(String, Vec<String>), &f64)| {
             let word = words.get(*cell as usize).filter(|_| !cell.is_nan())?;
             Some(label::literal(word))
         };
-        self.labels.iter().zip(cells).filter_map(word).collect::<Vec<_>>().join(", ")
+        let words: Vec<String> = self.labels.iter().zip(cells).filter_map(word).collect();
+        match self.labels.first() {
+            Some((name, _)) if words.is_empty() => format!("no {}", label::literal(name)),
+            _ => words.join(", "),
+        }
+    }
+
+    /// Drops all labels but `name`, if it is one that varies.
+    pub fn keep_label(&mut self, name: &str) {
+        if self.labels.iter().any(|(label, _)| label == name) {
+            self.labels.retain(|(label, _)| label == name);
+        }
     }
 
     /// The names of the labels that vary.
@@ -272,16 +289,15 @@ impl FilteredTable {
 
     /// # Errors
     /// If there is no axis, or no column (`what`), of this name.
-    pub fn check(&self, argument: &str, what: &'static str, name: &str) -> Result<(), PlotError> {
-        let found: Vec<String> = match what {
+    pub fn check(&self, argument: &str, what: &str, name: &str) -> Result<(), PlotError> {
+        let known: Vec<String> = match what {
             "axis" => self.axes.iter().map(|axis| axis.name.clone()).collect(),
             _ => self.headings.iter().map(|heading| heading.name.clone()).collect(),
         };
-        if found.iter().any(|known| known == name) {
+        if known.iter().any(|known| known == name) {
             return Ok(());
         }
-        let (argument, table) = (argument.to_owned(), self.table.clone());
-        Err(PlotError::NoColumn { argument, table, what, name: name.to_owned(), found })
+        Err(PlotError::unknown(&format!("{argument}: the table `{}` has no {what}", self.table), name, &known))
     }
 
     /// The column of this name, if it was written.
@@ -477,7 +493,10 @@ impl FilteredTable {
         };
         let text = conditions.iter().map(Condition::shown).collect::<Vec<_>>().join(", ");
         let found = columns.iter().map(Values::listed).collect::<Vec<_>>().join("; ");
-        Ok(PlotError::NoRows { table: self.table, text, found, help })
+        Ok(PlotError::Refused(format!(
+            "--where {text}: no row of the table `{}` meets this\n  found: {found}\n  help: {help}",
+            self.table
+        )))
     }
 }
 

@@ -347,7 +347,7 @@ impl GroupRole {
     }
 }
 
-/// The groups of the rows over `axes`: in the order of their first rows if each has a label, else ascending. More than `MAX_GROUPS` if there are too
+/// The groups of the rows over `axes`: if each has a label, by the first rows of the labels; then by ascending values. More than `MAX_GROUPS` if there are too
 /// many. Their values are those of the second columns `drawn` over the first ones, which are axes; without columns, each group has a value.
 fn find(
     filtered: &FilteredTable,
@@ -384,14 +384,17 @@ fn find(
         found.len() <= MAX_GROUPS
     })?;
     let mut found: Vec<FoundGroup> = found.into_values().map(|(group, _)| group).collect();
-    if found.iter().any(|group| group.label.is_empty()) {
+    let is_labelled = found.iter().all(|group| !group.label.is_empty());
+    if !is_labelled {
         found.iter_mut().for_each(|group| group.label.clear());
-        let in_order = |(a, b): (&f64, &f64)| a.total_cmp(b);
-        let order = |a: &FoundGroup, b: &FoundGroup| {
-            a.values.iter().zip(&b.values).map(in_order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
-        };
-        found.sort_by(order);
     }
+    let labels: IndexSet<String> = found.iter().map(|group| group.label.clone()).collect();
+    let free: Vec<usize> = (0..axes.len()).filter(|&axis| !(is_labelled && filtered.is_of_point(axes[axis]))).collect();
+    found.sort_by(|a, b| {
+        let [first, second] = [a, b].map(|group| labels.get_index_of(&group.label));
+        let values = free.iter().map(|&axis| a.values[axis].total_cmp(&b.values[axis]));
+        first.cmp(&second).then(values.into_iter().find(|order| order.is_ne()).unwrap_or(Ordering::Equal))
+    });
     Ok(found)
 }
 

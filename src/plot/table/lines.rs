@@ -3,6 +3,8 @@
 use super::cells::AxisCells;
 use super::filtered::FilteredTable;
 use super::groups::{self, GroupRole, Groups};
+use indexmap::IndexSet;
+
 use crate::plot::colour;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::{Scale, range};
@@ -200,6 +202,12 @@ impl Rows {
         self.lines.iter().flat_map(|line| &line.ranges).flatten().any(|(low, high)| high > low)
     }
 
+    /// For each line, the number of its name: lines of one label share a colour.
+    fn series(&self) -> Vec<usize> {
+        let mut names: IndexSet<&str> = IndexSet::new();
+        self.groups.shown.iter().map(|group| names.insert_full(&group.name).0).collect()
+    }
+
     /// For each line, the first line with which it coincides in all panels.
     fn leaders(&self, graphs: &[Graph]) -> Vec<usize> {
         let fraction = |graph: &Graph, line: usize| -> Vec<(f64, f64)> {
@@ -221,11 +229,13 @@ impl Rows {
 
     /// The panel with the curves that are drawn.
     fn draw(&self, Graph { mut panel, curves, .. }: Graph, leaders: &[usize]) -> Panel {
-        for (series, points) in curves.into_iter().enumerate().filter(|(series, _)| leaders[*series] == *series) {
+        let all = self.series();
+        for (line, points) in curves.into_iter().enumerate().filter(|(line, _)| leaders[*line] == *line) {
+            let series = all[line];
             if !self.are_scattered {
                 panel.layers.push(Layer::Line(points.clone(), colour::series(series)));
             }
-            let named = points.iter().copied().zip(self.lines[series].names.iter().cloned());
+            let named = points.iter().copied().zip(self.lines[line].names.iter().cloned());
             let named = named.filter(|((_, y), name)| y.is_finite() && !name.is_empty());
             panel.layers.push(Layer::Names(named.collect()));
             if self.is_marked(&points) {
@@ -236,10 +246,16 @@ impl Rows {
     }
 
     fn legend(&self, graphs: &[Graph], leaders: &[usize]) -> Vec<Entry> {
-        let names: Vec<&str> = self.groups.shown.iter().map(|group| group.name.as_str()).collect();
-        Entry::of_series(&names, leaders, |series| match self.are_scattered {
-            true => Key::Mark(Symbol::of_series(series)),
-            false => Key::series(series, graphs.iter().any(|graph| self.is_marked(&graph.curves[series]))),
+        let series = self.series();
+        // Each name once, at its first line.
+        let firsts: Vec<usize> = (0..series.len()).filter(|&line| !series[..line].contains(&series[line])).collect();
+        let names: Vec<&str> = firsts.iter().map(|&line| self.groups.shown[line].name.as_str()).collect();
+        let is_drawn = |name: usize| (0..series.len()).any(|line| series[line] == name && leaders[line] == line);
+        let leader = |(name, &line)| if is_drawn(name) { name } else { series[leaders[line]] };
+        let leaders: Vec<usize> = firsts.iter().enumerate().map(leader).collect();
+        Entry::of_series(&names, &leaders, |place| match self.are_scattered {
+            true => Key::Mark(Symbol::of_series(place)),
+            false => Key::series(place, graphs.iter().any(|graph| self.is_marked(&graph.curves[firsts[place]]))),
         })
     }
 }

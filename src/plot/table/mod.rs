@@ -250,7 +250,7 @@ impl Source {
             let conditions = [request.conditions.clone(), Condition::all(&format!("{hidden}=inf"))?].concat();
             filtered = FilteredTable::new(&self.folder, &self.manifest, table, &conditions)?;
         }
-        let no_table = || PlotError::NoTable { name: table.to_owned(), found: self.tables() };
+        let no_table = || PlotError::unknown("the dataset has no table", table, &self.tables());
         let picture = TABLE_PICTURES.iter().find(|picture| picture.table == table).ok_or_else(no_table)?;
         let is_default = request.x.is_none() && request.y.is_none() && request.colour.is_none();
         let (mut figure, drawn) = match table {
@@ -258,6 +258,9 @@ impl Source {
             "gap_quantiles" if is_default => reduced::quantiles(&filtered)?,
             _ => {
                 let shape = choice::choose(&filtered, picture, request)?;
+                if let (Shape::Lines(_), Some(label)) = (&shape, &request.colour) {
+                    filtered.keep_label(label);
+                }
                 let drawn = match &shape {
                     Shape::Map(plan) => vec![plan.x.clone(), plan.y.clone()],
                     Shape::Lines(plan) => vec![plan.x.clone()],

@@ -323,6 +323,17 @@ impl Problem {
         })
     }
 
+    /// Least duration of a path for the slip law through the state at which `T` vanishes, which is above that of the ceiling; 0 if an end is not
+    /// above it.
+    fn time_over_weakest(&self) -> f64 {
+        let weakest = 1.0 / (self.b - self.a);
+        let fall = weakest - self.from.below_floor;
+        if fall <= 0.0 || weakest <= self.to.below_floor {
+            return 0.0;
+        }
+        ln_1p(fall / (self.ln_ceiling - weakest)) / self.ceiling + rise::time_from(weakest, self.to.below_floor)
+    }
+
     /// Whether the proof holds at every state that a path of duration `t_f` may reach.
     fn is_proven(&self, t_f: f64) -> bool {
         if self.from.v > self.ceiling {
@@ -331,6 +342,9 @@ impl Problem {
         let ceiling = State::steady(self.ceiling, self.ceiling);
         if self.is_proven_down_to(&ceiling) {
             return true;
+        }
+        if self.law == StateLaw::Slip {
+            return t_f < self.time_over_weakest();
         }
         let spare = t_f - self.direct_time();
         if spare <= 0.0 {

@@ -71,6 +71,15 @@ fn fastest_time(problem: &Problem) -> f64 {
     -exp_m1(1.0 - from) - ln(to)
 }
 
+/// Least duration of a rise between two values of `-ln theta`.
+pub(super) fn time_from(from: f64, to: f64) -> f64 {
+    match () {
+        () if to >= 1.0 => E * (exp(-to) - exp(-from)),
+        () if from <= 1.0 => ln(from / to),
+        () => -exp_m1(1.0 - from) - ln(to),
+    }
+}
+
 /// Greatest length of a panel in `ln v`: the poles at `y = -c` are `pi` off the axis for `c > 0`, so that the error is `3.4^-32`.
 const MAX_PANEL: f64 = 4.0;
 

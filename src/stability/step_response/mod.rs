@@ -182,8 +182,8 @@ impl Response {
             LongTermBehaviour::BlowUp => return None,
         };
         let [low, high] = simulation.range();
-        // An undecided response may leave this range later.
-        let decided = outcome != Outcome::Undecided;
+        // An undecided response, and one that settles after the simulation, may leave this range later.
+        let decided = outcome != Outcome::Undecided && !simulation.unresolved.peak;
         let known = |velocity: f64, known: bool| if known { velocity } else { f64::NAN };
         let unresolved = simulation.unresolved;
         let peak = simulation.peak(rtol).filter(|peak| decided && !unresolved.t_peak && !peak.t.is_nan());

@@ -52,6 +52,8 @@ pub struct Simulation {
 /// leaves the band of settled velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct UnresolvedNumbers {
+    /// The greatest velocity: it is only known that the response settles.
+    pub peak: bool,
     /// The least velocity.
     pub trough: bool,
     /// The least velocity on the limit cycle.
@@ -73,8 +75,8 @@ pub(super) const UNDERFLOW_LN_V: f64 = -1000.0;
 
 /// Simulates the response from steady sliding at `e^x v_f`, `x` not 0, with numbers to `rtol`.
 ///
-/// Runs at ever tighter tolerances end where no number changes by more than `rtol`. Otherwise the response is `Undecided`,
-/// or the numbers that change are unresolved.
+/// Runs at ever tighter tolerances end where no number changes by more than `rtol`. Otherwise the response is `Undecided`, or settles in an unknown
+/// time if that is proved, or the numbers that change are unresolved.
 pub(super) fn follow(slider: &ScaledBlock, x: f64, rtol: f64) -> Simulation {
     let linear = LinearStability::of(slider);
     if let Some(long_term) = without_simulation(slider, linear, x) {
@@ -82,6 +84,16 @@ pub(super) fn follow(slider: &ScaledBlock, x: f64, rtol: f64) -> Simulation {
         return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, unresolved };
     }
     let settles = settles(slider, linear, x);
+    let simulation = simulate(slider, linear, x, rtol, settles);
+    if settles && simulation.long_term == LongTermBehaviour::Undecided {
+        let unresolved = UnresolvedNumbers { peak: true, trough: true, t_peak: true, ..simulation.unresolved };
+        return Simulation { long_term: LongTermBehaviour::Settled { time: f64::NAN }, unresolved, ..simulation };
+    }
+    simulation
+}
+
+/// Runs at ever tighter tolerances.
+fn simulate(slider: &ScaledBlock, linear: LinearStability, x: f64, rtol: f64, settles: bool) -> Simulation {
     let mut simulation = follow_once(slider, linear, x, rtol, ACCURACIES[0]);
     let mut known = false;
     for fractions in ACCURACIES.windows(2) {
@@ -126,12 +138,16 @@ fn without_simulation(slider: &ScaledBlock, linear: LinearStability, x: f64) -> 
     (!is_checked(slider, x)).then_some(LongTermBehaviour::Undecided)
 }
 
-/// Whether a block without mass is proved to settle under the slip law: the potential at the start is negative (docs/derivations.md, "Step
-/// responses of other laws").
+/// Whether the response is proved to settle by a Lyapunov function (docs/derivations.md): for `b <= a`; without a mass also above the critical
+/// stiffness, under the slip law if the potential at the start is negative.
 fn settles(slider: &ScaledBlock, linear: LinearStability, x: f64) -> bool {
     let &ScaledBlock { state_law, a, b, inertia, k } = slider;
-    let is_massless_slip = state_law == StateLaw::Slip && inertia == 0.0 && b > a;
-    is_massless_slip && linear.stable && k * exp_m1(-x) + (k - (b - a)) * x < a
+    let is_decreasing = || match state_law {
+        StateLaw::Ageing => true,
+        StateLaw::Slip => k * exp_m1(-x) + (k - (b - a)) * x < a,
+        StateLaw::Prz => false,
+    };
+    state_law != StateLaw::Prz && (b <= a || inertia == 0.0 && linear.stable && is_decreasing())
 }
 
 /// Factor of each bound of the physical domain up to which responses are simulated. Chosen: the random sample of
