@@ -1,6 +1,6 @@
 //! `step_response`: the end of a response agrees with stability, and responses scale.
 
-use slipsweep::model::{StateLaw, Transition};
+use slipsweep::model::{Law, StateLaw, Transition};
 use slipsweep::protocol::SpringBlock;
 use slipsweep::stability::SteadySliding;
 use slipsweep::stability::step_response::{Outcome, Response, VelocityStep};
@@ -125,7 +125,11 @@ fn sound(step: &VelocityStep, response: &Response, stable: bool, row: &mut Row) 
         Outcome::Diverged => row.fact("a step that diverges has no response", false),
         Outcome::Undecided => row.fact("nothing is reported if undecided", v_peak.is_nan() && settling_time.is_none()),
     }
-    if outcome != Outcome::Undecided {
+    let Law { a, b } = step.transition.law;
+    let is_proven = step.state_law != StateLaw::Prz && (b <= a || step.m == 0.0 && stable);
+    // A proof of settling gives no numbers.
+    let has_numbers = outcome != Outcome::Undecided && !(outcome == Outcome::Settled && is_proven && v_peak.is_nan());
+    if has_numbers {
         row.fact("peak and trough about v_f", v_peak >= v_f && (v_trough.is_nan() || v_trough <= v_f));
         row.fact("finite", v_peak.is_finite() && t_end.is_finite() && t_peak.is_none_or(f64::is_finite));
         row.fact("times in order", t_peak.is_none_or(|t| (0.0..=t_end).contains(&t)));

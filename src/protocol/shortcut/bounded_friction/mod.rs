@@ -146,7 +146,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
             let Some(found) = found.filter(|found| best.as_ref().is_none_or(|best| found.step < best.step)) else {
                 continue;
             };
-            let is_good = found.step <= 0.5 * max_noise;
+            let is_good = found.step <= MAX_NOISE;
             best = Some(found);
             if is_good {
                 break;
