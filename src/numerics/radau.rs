@@ -6,7 +6,6 @@
 use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
-use super::stiff::Collocation;
 
 /// Number of nodes. Chosen: two vectors of eight.
 pub const NODES: usize = 16;
@@ -144,27 +143,42 @@ pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
 
 fn make() -> Radau {
     let one = DoubleDouble::new(1.0);
+    let half = DoubleDouble::new(0.5);
+    let n = NODES as f64;
     let u = nodes::<NODES>();
-    let Collocation { nodes: places, integration, .. } = Collocation::make();
-    let w = integration[NODES - 1];
+    let nodes = u.map(|u| u + u - one);
+    let polynomials = nodes.map(legendre);
+    let count = DoubleDouble::new(n * n);
     let mut rule = Radau {
-        u: places,
-        rest: u.map(|u| (one - u).high),
-        w,
-        columns: std::array::from_fn(|k| integration.map(|row| row[k])),
+        u: [0.0; NODES],
+        rest: [0.0; NODES],
+        w: [0.0; NODES],
+        columns: [[0.0; NODES]; NODES],
         barycentric: [1.0; NODES + 1],
         slopes: [[0.0; NODES]; NODES],
         slopes_at_0: [0.0; NODES],
         highest: [[0.0; NODES]; 2],
     };
     for k in 0..NODES {
-        let polynomials = legendre(u[k] + u[k] - one);
+        let last = polynomials[k][NODES - 1];
+        let weight = half * (one + nodes[k]) / (count * last * last);
+        rule.u[k] = u[k].high;
+        rule.rest[k] = (one - u[k]).high;
+        rule.w[k] = weight.high;
+        for j in 0..NODES {
+            // int_-1^x P_m = (P_(m+1) - P_(m-1))/(2m + 1); the rule keeps the P_m orthogonal up to m = n - 1.
+            let mut sum = one + nodes[j];
+            for m in 1..NODES {
+                sum = sum + polynomials[k][m] * (polynomials[j][m + 1] - polynomials[j][m - 1]);
+            }
+            rule.columns[k][j] = (weight * half * sum).high;
+        }
         for (i, highest) in rule.highest.iter_mut().enumerate() {
             let m = NODES - 2 + i;
-            highest[k] = w[k] * polynomials[m].high * (2 * m + 1) as f64;
+            highest[k] = (weight * polynomials[k][m]).high * (2 * m + 1) as f64;
         }
     }
-    let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { places[k] } else { 0.0 });
+    let places: [f64; NODES + 1] = std::array::from_fn(|k| if k < NODES { rule.u[k] } else { 0.0 });
     for k in 0..=NODES {
         for j in (0..=NODES).filter(|&j| j != k) {
             // The factor keeps the products near 1; it cancels in the formula.
@@ -185,11 +199,11 @@ fn make() -> Radau {
     rule
 }
 
-/// `P_0 … P_(n-1)`.
-fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES] {
-    let mut p = [DoubleDouble::new(1.0); NODES];
+/// `P_0 … P_n`.
+fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES + 1] {
+    let mut p = [DoubleDouble::new(1.0); NODES + 1];
     p[1] = x;
-    for m in 2..NODES {
+    for m in 2..=NODES {
         p[m] = next(m, x, p[m - 1], p[m - 2]);
     }
     p

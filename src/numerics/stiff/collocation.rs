@@ -34,7 +34,7 @@ pub fn radau_iia_9() -> &'static Collocation<5> {
 
 impl<const S: usize> Collocation<S> {
     /// The method, computed.
-    pub(in crate::numerics) fn make() -> Collocation<S> {
+    fn make() -> Collocation<S> {
         let one = DoubleDouble::new(1.0);
         let c = radau::nodes::<S>();
         // The basis polynomial j is u/c_j prod_(k != j) (u - c_k)/(c_j - c_k): its factors, multiplied out one by one.
