@@ -94,10 +94,11 @@ impl Sweep {
         };
         // The accuracy of a table is usually that of the sweep.
         let own = key.strip_suffix(".rtol").filter(|_| read::value(&self.text, key).is_none());
+        let of_table = key;
         let key = own.filter(|_| read::value(&self.text, RTOL).is_some()).map_or(key, |_| RTOL);
         let value = |sweep: &Sweep, facts: &[(String, String)]| {
-            let fact =
-                facts.iter().find(|(known, _)| known == key && !key.contains("axes.")).map(|(_, value)| value.clone());
+            let fact = facts.iter().find(|(known, _)| known == of_table && !key.contains("axes."));
+            let fact = fact.map(|(_, value)| value.clone());
             let value = read::value(&sweep.text, key).or(fact);
             value.map_or_else(|| format!("no {key}"), |value| format!("{key} = {}", shown(&value, MAX_SHOWN_CHARS)))
         };

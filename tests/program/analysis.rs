@@ -369,7 +369,7 @@ fn wrong_paths_and_names() {
         refused(folder.path(), &["query", "results/test", "SELECT 1", "--out", "x.pdf"]),
         (1, message.to_owned())
     );
-    let message = "error: empty: a file or folder of another kind\n  expected: the folder of a dataset, such as \
+    let message = "error: empty: a folder without a dataset\n  expected: the folder of a dataset, such as \
                    results/NAME\n  help: name a folder that `slipsweep run` wrote\n";
     assert_eq!(refused(folder.path(), &["summary", "empty"]), (1, message.to_owned()));
 }

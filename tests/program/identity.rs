@@ -118,8 +118,8 @@ fn specs_are_compared_by_meaning_and_the_first_difference_is_named() {
         ),
         (
             first.replace("[axes]", "[accuracy]\nrtol = 1e-9\n[axes]"),
-            "tables.optimal.rtol = 1e-9 (line 10)",
-            "tables.optimal.rtol = 1e-10",
+            "accuracy.rtol = 1e-9 (line 3)",
+            "accuracy.rtol = 1e-10",
         ),
         (
             first.replace("[tables.optimal]", "[tables.optimal]\ncolumns = [\"work\"]"),

@@ -219,10 +219,15 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
         "error: best.csv: a trace\n  expected: the folder of a dataset, such as results/NAME\n  help: `slipsweep \
          plot best.csv` draws it\n"
     );
-    for path in ["results", "results/tiny/optimal", "results/tiny/manifest.json", "other.csv"] {
+    for (path, kind, help) in [
+        ("results", "a folder of datasets", "name one of them: results/tiny"),
+        ("results/tiny/optimal", "a piece of a dataset", "name the dataset, results/tiny"),
+        ("results/tiny/manifest.json", "a piece of a dataset", "name the dataset, results/tiny"),
+        ("other.csv", "a file of rows", "`slipsweep head other.csv` shows it, and `slipsweep query` reads it"),
+    ] {
         let said = complaint(folder, &["plot", path]);
-        assert!(said.starts_with(&format!("error: {path}: a file or folder of another kind\n")), "{said}");
-        assert!(said.ends_with("\n  help: name a folder that `slipsweep run` wrote\n"), "{said}");
+        assert!(said.starts_with(&format!("error: {path}: {kind}\n")), "{said}");
+        assert!(said.ends_with(&format!("\n  help: {help}\n")), "{said}");
     }
     assert!(complaint(folder, &["plot", "none.csv"]).starts_with("error: none.csv: there is no such file or folder\n"));
     // A protocol is named where `trace` expects one; whatever has the look of a path is one.

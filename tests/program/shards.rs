@@ -107,8 +107,8 @@ fn status_lists_parts_and_the_command_for_the_missing_ones() {
     assert_eq!(code, Some(1));
     assert_eq!(
         error,
-        "error: results/test: not a dataset\n  expected: a folder with a manifest.json or at least one part\n  help: name a folder \
-         that `slipsweep run` wrote\n"
+        "error: results/test: there is no such file or folder\n  expected: the folder of a dataset, such as results/NAME\n  \
+         help: check the path\n"
     );
     let (code, said, error) = say(&["run", "spec.toml", "--shard", "1/4"]);
     // A busy machine may have lines of progress.

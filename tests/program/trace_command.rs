@@ -179,11 +179,11 @@ fn wrong_arguments_get_one_clear_message() {
         (&[&["gap", "--alpha-2", "0"], UP], "error: `gap` needs --alpha-3"),
         (
             &[&["optimal", "--t-f", "-1"], &UP[2..]],
-            "error: invalid value '-1' for '--t-f <T>': expected 1e-20 <= t_f <= 1e20",
+            "error: invalid value '-1' for '--t-f <T>': expected 1e-20 <= t_f <= 1e20, in units of l/v_0",
         ),
         (
             &[&["optimal", "--t-f", "soon"], &UP[2..]],
-            "error: invalid value 'soon' for '--t-f <T>': not a number; expected 1e-20 <= t_f <= 1e20",
+            "error: invalid value 'soon' for '--t-f <T>': not a number; expected 1e-20 <= t_f <= 1e20, in units of l/v_0",
         ),
         (
             &[&["optimal", "--rtol", "1"], UP],
@@ -489,8 +489,8 @@ fn a_row_without_a_path_states_why() {
 fn a_disturbance_compares_both_loops() {
     let disturbed = |change: &str, more: &[&str]| shown(&[&["optimal", "--disturb", change], UP, more]);
     let text = disturbed("theta=+10% at 0.25", &[]);
-    assert!(text.contains("open loop, v(t) as planned: work +0.015605, terminal_error 0.0873898599\n"), "{text}");
-    assert!(text.contains("closed loop, v(theta, t_left): work +0.102888, terminal_error 0\n"), "{text}");
+    assert!(text.contains("open loop, v(t) as planned: work +0.015604623, terminal_error 0.0873898599\n"), "{text}");
+    assert!(text.contains("closed loop, v(theta, t_left): work +0.102887655, terminal_error 0\n"), "{text}");
     // The closed loop ends at theta_f.
     let end = |text: &str| -> f64 {
         let last = text.lines().last().expect("has rows");

@@ -3,9 +3,7 @@
 use multiversion::multiversion;
 
 use crate::case::{Case, Method};
-use crate::numerics::stiff::{
-    Accuracy, Collocation, Failure, Integrator, Piece, radau_iia_5, radau_iia_9, radau_iia_13,
-};
+use crate::numerics::stiff::{Accuracy, Collocation, Integrator, Piece, radau_iia_9};
 use crate::peaks::Peaks;
 use crate::run::{between, step_to};
 use crate::slider::{Slider, State, X};
@@ -25,7 +23,7 @@ impl Method for Switching {
             if let Some(arrested) = slider.arrest(run.y()) {
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            let leg = step_to(&mut run, case.t_end).ok()?;
+            let leg = step_to(&mut run, case.t_end)?;
             if let Some(peaks) = &mut peaks {
                 // To the order of the method, as the table polishes its extrema.
                 peaks.look(|u| match between(&mut run, &leg, 0.0, u) {
@@ -47,7 +45,7 @@ macro_rules! method {
             "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
             "x86_64+avx+avx2+bmi1+bmi2"
         ))]
-        fn $step(run: &mut Integrator<'_, Slider, 3, $stages>, t_end: f64) -> Result<Piece<3, $stages>, Failure> {
+        fn $step(run: &mut Integrator<'_, Slider, 3, $stages>, t_end: f64) -> Option<Piece<3, $stages>> {
             run.step(t_end)
         }
 
@@ -63,16 +61,14 @@ macro_rules! method {
     };
 }
 
-method!(3, radau_iia_5, step_5);
 method!(5, radau_iia_9, step_9);
-method!(7, radau_iia_13, step_13);
 
 fn integrate<const S: usize>(
     case: &Case,
     tolerance: f64,
     mut peaks: Option<&mut Peaks>,
     rule: &'static Collocation<S>,
-    step: fn(&mut Integrator<'_, Slider, 3, S>, f64) -> Result<Piece<3, S>, Failure>,
+    step: fn(&mut Integrator<'_, Slider, 3, S>, f64) -> Option<Piece<3, S>>,
 ) -> Option<State> {
     let (slider, start) = (&case.slider, case.start());
     let accuracy = Accuracy { tolerance, scale: case.absolute(1.0) };
@@ -81,7 +77,7 @@ fn integrate<const S: usize>(
         if let Some(arrested) = slider.arrest(run.y()) {
             run.jump(arrested, slider.first_step(&arrested));
         }
-        let piece = step(&mut run, case.t_end).ok()?;
+        let piece = step(&mut run, case.t_end)?;
         if let Some(peaks) = &mut peaks {
             // To the order of the method, as the table polishes its extrema.
             peaks.look(|u| match run.between(&piece, 0.0, u) {
