@@ -32,7 +32,7 @@ use with_diffsol::{Bdf, Esdirk34};
 
 fn main() {
     let ours: Vec<Box<dyn Method>> =
-        vec![Box::new(Switching), Box::new(Ours::<3>), Box::new(Ours::<5>), Box::new(Ours::<7>)];
+        vec![Box::new(Switching), Box::new(Ours::<5>)];
     let mut libraries: Vec<Box<dyn Method>> = vec![
         Box::new(Bdf),
         Box::new(Esdirk34),
