@@ -242,9 +242,9 @@ fn the_wrong_kind_of_file_is_named_with_the_command_that_takes_it() {
         assert!(said.starts_with(&format!("error: {path}: {kind}\n")), "{said}");
         assert!(said.contains(&format!("\n  help: {help}")), "{said}");
     }
-    for path in ["results", "results/tiny/optimal"] {
+    for (path, kind) in [("results", "a folder of datasets"), ("results/tiny/optimal", "a piece of a dataset")] {
         let said = complaint(folder, &["run", path]);
-        assert!(said.starts_with(&format!("error: {path}: a file or folder of another kind\n")), "{said}");
+        assert!(said.starts_with(&format!("error: {path}: {kind}\n")), "{said}");
     }
 }
 
