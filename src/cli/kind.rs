@@ -105,7 +105,7 @@ fn other(path: &Path) -> (String, String) {
         let dataset = if dataset == Path::new("") { Path::new(".") } else { dataset };
         return ("a piece of a dataset".to_owned(), format!("name the dataset, {}", dataset.display()));
     }
-    let is_ours = "name a folder that `slipsweep run` wrote".to_owned();
+    let help = "name a folder that `slipsweep run` wrote".to_owned();
     if path.is_dir() {
         let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
         let mut datasets: Vec<PathBuf> = entries.filter(|folder| folder.join(MANIFEST).is_file()).collect();
@@ -113,19 +113,19 @@ fn other(path: &Path) -> (String, String) {
         let names: Vec<String> =
             datasets.iter().take(MAX_NAMED_DATASETS).map(|path| path.display().to_string()).collect();
         return match names.is_empty() {
-            true => ("a folder without a dataset".to_owned(), is_ours),
+            true => ("a folder without a dataset".to_owned(), help),
             false => ("a folder of datasets".to_owned(), format!("name one of them: {}", names.join(", "))),
         };
     }
     match (file::open(path), ending(path).as_str()) {
-        (Err(error), _) => (error.to_string(), is_ours),
+        (Err(error), _) => (error.to_string(), help),
         (_, "csv" | "parquet") => {
             ("a file of rows".to_owned(), format!("`slipsweep head {shown}` shows it, and `slipsweep query` reads it"))
         }
         (_, "html" | "htm" | "svg" | "png" | "pdf") => {
             ("a page or a picture".to_owned(), "open it in a browser or a viewer".to_owned())
         }
-        _ => ("a file of another kind".to_owned(), is_ours),
+        _ => ("a file of another kind".to_owned(), help),
     }
 }
 

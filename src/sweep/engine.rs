@@ -65,7 +65,7 @@ pub enum RunError {
     #[error(
         "{table}: part {part}, rows {} to {}, panicked: {message}\n  help: this is a bug in slipsweep: please report it; {}",
         rows.start,
-        rows.end,
+        rows.end.saturating_sub(1),
         match others {
             0 => "all other parts are finished".to_owned(),
             _ => format!("{others} more parts panicked; all others are finished"),

@@ -772,3 +772,17 @@ fn answers_have_units_and_files_that_are_half_are_refused() {
     let answer = printed(folder.path(), &["query", "dates.csv", "SELECT sum(x) AS x FROM dates", "--format", "csv"]);
     assert_eq!(answer, "x\n3\n");
 }
+
+/// A word has no number, and a table with semicolons is not CSV here.
+#[test]
+fn regress_words_have_no_number_and_columns_end_with_commas() {
+    let folder = small();
+    let (code, said) =
+        refused(folder.path(), &["query", "results/test", "SELECT CAST(strategy AS INT) AS n FROM optimal"]);
+    assert!(code > 0 && said.contains("speed_up") && !said.contains("Deprecation"), "{said}");
+    fs::write(folder.path().join("log.csv"), "time;velocity\n1,5;2,5\n").expect("is writable");
+    for arguments in [&["head", "log.csv"][..], &["query", "log.csv", "SELECT * FROM log"]] {
+        let (code, said) = refused(folder.path(), arguments);
+        assert!(code > 0 && said.contains("columns that end with ; or a tab"), "{said}");
+    }
+}

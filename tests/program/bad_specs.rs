@@ -116,6 +116,53 @@ fn doubtful_axes_and_scales() {
     ] {
         assert!(warnings.contains(expected), "{warnings}");
     }
+    // A coefficient of friction in place of a stress.
+    let coefficient = si.replace("v_ceiling = [500, inf]", "tau_ceiling = 0.7");
+    fs::write(folder.path().join("tau.toml"), coefficient).expect("is writable");
+    let output = slipsweep(&["plan", "tau.toml"], folder.path());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("tau.toml:14: axes.tau_ceiling: 0.7 Pa is unusually low"));
+    // A ceiling that one of two tables lacks.
+    let mixed = "name = \"mixed\"\n[axes]\nt_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nv_ceiling = 300.0\n[tables.optimal]\n\
+                 [tables.crossover]\n";
+    fs::write(folder.path().join("mixed.toml"), mixed).expect("is writable");
+    let warning = "warning: mixed.toml:8: axes.v_ceiling: no effect on crossover\n  expected: numbers under the ceiling\n  help: read these \
+                   tables as those without the ceiling\n";
+    assert_eq!(String::from_utf8_lossy(&slipsweep(&["plan", "mixed.toml"], folder.path()).stderr), warning);
+}
+
+/// Options of other programs, folders that are not there, and paths that Slurm cannot log to.
+#[test]
+fn options_and_paths_lead_to_what_was_meant() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let say = |arguments: &[&str]| {
+        let output = slipsweep(arguments, folder.path());
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    for (command, given, meant) in [
+        ("run", "--jobs", "--threads"),
+        ("run", "-j2", "--threads"),
+        ("trace", "--tf", "--t-f"),
+        ("trace", "--vi", "--v-i"),
+    ] {
+        let said = say(&[command, "x", given]);
+        assert!(said.contains(&format!("a similar argument exists: '{meant}'")), "{said}");
+    }
+    assert!(say(&["init", "nowhere/b"]).starts_with("error: `nowhere/b`: there is no folder `nowhere`\n"));
+    assert_eq!(slipsweep(&["init", "a"], folder.path()).status.code(), Some(0));
+    let said = say(&["shards", "a.toml", "--engine", "slurm", "--shards", "2", "--out", "back\\slash"]);
+    assert!(said.contains("Slurm writes no log below a folder whose name has a backslash"), "{said}");
+}
+
+/// Rows without values, as spreadsheets write them below the last one, are no points.
+#[test]
+fn empty_rows_of_a_spreadsheet_are_skipped() {
+    let folder = tempfile::tempdir().expect("is writable");
+    fs::write(folder.path().join("p.csv"), "t_f,v_f\r\n0.02,100\r\n,\r\n0.03,100\r\n,\r\n").expect("is writable");
+    let spec = "name = \"p\"\npoints = \"p.csv\"\n[axes]\na = 0.03\nb = 0.05\nv_i = 3.0\n[tables.optimal]\n";
+    fs::write(folder.path().join("p.toml"), spec).expect("is writable");
+    let output = slipsweep(&["run", "p.toml"], folder.path());
+    assert!(String::from_utf8_lossy(&output.stdout).starts_with("optimal: 2 rows (2 ok)\n"), "{output:?}");
 }
 
 /// Axes outside the physical domain are computed with a warning, unless a condition may drop those points.

@@ -210,8 +210,8 @@ fn a_panic_names_the_part_and_the_other_parts_are_kept() {
     assert_eq!(said(&whole), (Some(0), String::new()));
     let whole = files(&folder.path().join("whole/test"));
     for (row, reported, others) in [
-        (270_007, "gap: part 1, rows 262144 to 300000, panicked: requested by SLIPSWEEP_PANIC\n", 0),
-        (17, "gap: part 0, rows 0 to 262144, panicked: requested by SLIPSWEEP_PANIC\n", 1),
+        (270_007, "gap: part 1, rows 262144 to 299999, panicked: requested by SLIPSWEEP_PANIC\n", 0),
+        (17, "gap: part 0, rows 0 to 262143, panicked: requested by SLIPSWEEP_PANIC\n", 1),
     ] {
         let out = row.to_string();
         let mut command = slipsweep(folder.path());

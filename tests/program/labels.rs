@@ -189,3 +189,25 @@ fn numbers_in_quotes_are_labels_and_scales_are_none() {
     let empty = refused("core,a,b\n");
     assert!(empty.contains("no points") && !empty.contains("unknown"), "{empty}");
 }
+
+/// Lines have the colours of the label that `--color` names, each of its words once in the legend; an empty cell has a name, too.
+#[test]
+fn lines_are_coloured_by_one_label() {
+    let folder = tempfile::tempdir().expect("is writable");
+    run(&sweep(folder.path(), CASES, &spec()), &folder.path().join("results"), 0);
+    let legend = |label: &str| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+        program.current_dir(folder.path()).args(["plot", "results/test", "--table", "optimal", "--out", "p.svg"]);
+        let output = program.args(["--x", "t_f", "--y", "work", "--color", label]).output().expect("runs");
+        assert!(output.status.success(), "{output:?}");
+        fs::read_to_string(folder.path().join("p.svg")).expect("is text")
+    };
+    let by_sample = legend("sample_id");
+    for (words, count) in [("g1<", 1), ("g3<", 1), ("no sample_id<", 1), ("granite", 0)] {
+        assert_eq!(by_sample.matches(words).count(), count, "{words}: {by_sample}");
+    }
+    let by_material = legend("material");
+    for (words, count) in [(">granite<", 1), ("gabbro, wet<", 1), ("g1<", 0)] {
+        assert_eq!(by_material.matches(words).count(), count, "{words}: {by_material}");
+    }
+}

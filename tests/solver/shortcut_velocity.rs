@@ -512,3 +512,29 @@ fn regress_accelerations_from_near_1_have_members() {
         }
     }
 }
+
+/// Greatest friction that is a small rest of terms of size 1, by Taylor series of 110 bits.
+#[test]
+fn regress_a_small_greatest_friction_is_good_to_rtol() {
+    for (t_f, a, b, v_i, v_f, friction_max) in [
+        (
+            0.00290937123183722,
+            0.015343257127902792,
+            0.16529455471616664,
+            694.7705303682163,
+            26024.173648158474,
+            0.021114379617535,
+        ),
+        (
+            0.18241855418041925,
+            0.22299246067944017,
+            0.4845720492695942,
+            39.5907406142355,
+            260340.05479050046,
+            0.136649307433753,
+        ),
+    ] {
+        let found = solve("bounded_velocity", &case(Law { a, b }, v_i, v_f, t_f), 1e-10).expect("exists");
+        assert!(relative(found.friction_max, friction_max) < 1e-10, "{}", found.friction_max);
+    }
+}

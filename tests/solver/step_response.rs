@@ -858,3 +858,18 @@ fn regress_errors_of_a_run_let_no_step_diverge_that_is_proved_to_settle() {
         }
     }
 }
+
+/// Pulses that 100,000 steps do not resolve: a Lyapunov function decides for ageing and slip, and gives no numbers.
+#[test]
+fn regress_a_response_that_is_proved_to_settle_is_settled() {
+    let transition = Transition { law: Law { a: 0.01, b: 0.01 }, v_i: 1e3, v_f: 1e6 };
+    for (state_law, k, outcome) in [
+        (StateLaw::Ageing, 2e-6, Outcome::Settled),
+        (StateLaw::Slip, 2e-6, Outcome::Settled),
+        (StateLaw::Prz, 1e-5, Outcome::Undecided),
+    ] {
+        let found = respond(&VelocityStep { state_law, transition, k, m: 0.0 }, 1e-6);
+        let has_numbers = !found.v_peak.is_nan() || found.t_peak.is_some() || found.settling_time.is_some();
+        assert!(found.outcome == outcome && !has_numbers, "{state_law:?}: {found:?}");
+    }
+}

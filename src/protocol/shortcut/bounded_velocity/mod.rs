@@ -37,8 +37,8 @@ pub(super) const FAMILY: Family = Family {
     motion,
 };
 
-/// Friction in `mu_0 sigma`, of which the accuracy of theta determines a digit less than of 1. Derived: friction has a term 1.
-const SMALL_FRICTION: f64 = 0.1;
+/// Relative error of theta, fraction of what friction may have. Chosen: a digit is left for other errors.
+const THETA_FRACTION: f64 = 0.1;
 
 /// Finest accuracy of theta. Chosen: some hundred roundings.
 const FINEST_RTOL: f64 = 1e-14;
@@ -63,10 +63,10 @@ fn solve(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Shortcut, Ob
         follow(&curve, case, rtol, stats, |panel| panel.add_to(&law, &curve, rtol, &mut totals)).map(|()| totals)
     };
     let mut totals = totals_at(rtol)?;
-    // The greatest friction may be the small rest of terms that cancel.
+    // The greatest friction may be the small rest of terms that cancel: `b ln theta` has b times the relative error of theta.
     let size = totals.friction.high.abs();
-    if size < SMALL_FRICTION {
-        totals = totals_at((rtol * size).max(FINEST_RTOL))?;
+    if size < law.b {
+        totals = totals_at((THETA_FRACTION * rtol * size / law.b).max(FINEST_RTOL))?;
     }
     if !totals.work.is_finite() {
         return Err(Obstacle::NotConverged);
