@@ -485,3 +485,17 @@ fn regress_a_long_deceleration_is_solved_at_a_loose_tolerance() {
         );
     }
 }
+
+/// A block that nearly stops: at a tighter accuracy one residual is rounding, and another is well-conditioned. By Taylor series of 140 bits.
+#[test]
+fn regress_a_tighter_accuracy_is_no_worse_where_a_block_nearly_stops() {
+    let law = Law { a: 0.016823764435690804, b: 0.2466214434299296 };
+    let case = case(law, 178548.67564548462, 19.101189131049615, 0.06266619931652229, 0.32882717974327824);
+    for rtol in [1e-10, 1e-11, 1e-12, 1e-13] {
+        let found = solve(&case, rtol).expect("exists");
+        let alpha = found.alpha.expect("has a parameter");
+        // Rounding of the time, spent at the greatest velocity, leaves 1.2e-12.
+        assert!(relative(found.work, -594.5720902953263) < 2e-12, "{rtol}: {found:?}");
+        assert!(relative(alpha, 5.755347130954349) < 2e-12, "{rtol}: {found:?}");
+    }
+}

@@ -137,27 +137,24 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
     let order = paths(by_theta, case, spare, log_ratio);
     // Rounding of the time, at the greater velocity.
     let time_rounding = 100.0 * f64::EPSILON * t_f * v_i.max(v_f);
-    let rounds = [(LOW_NOISE.max(rtol), MAX_ERROR_GROWTH), (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY)];
+    let low_noise = LOW_NOISE.max(rtol);
+    let rounds = [(low_noise, MAX_ERROR_GROWTH), (MAX_NOISE.max(rtol).max(time_rounding), f64::INFINITY)];
+    let mut best: Option<Refined> = None;
     for (max_noise, max_growth) in rounds {
-        let mut best: Option<Refined> = None;
         for path in &order {
             let found =
                 search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), (rtol, max_noise), stats));
-            let Some(found) = found.filter(|found| best.as_ref().is_none_or(|best| found.step < best.step)) else {
-                continue;
+            best = match (best, found) {
+                (Some(best), Some(found)) if found.step >= best.step => Some(best),
+                (best, found) => found.or(best),
             };
             // Where rounding leaves more, another residual may be better conditioned.
-            let is_good = found.step <= 0.5 * max_noise;
-            best = Some(found);
-            if is_good {
-                break;
+            if let Some(Refined { path, panels, .. }) = best.take_if(|best| best.step <= 0.5 * low_noise) {
+                return Ok((path, panels));
             }
         }
-        if let Some(Refined { path, panels, .. }) = best {
-            return Ok((path, panels));
-        }
     }
-    Err(Obstacle::NotConverged)
+    best.map(|Refined { path, panels, .. }| (path, panels)).ok_or(Obstacle::NotConverged)
 }
 
 /// The paths of `case` for each residual and direction, in the order in which they are tried. `spare` is the time beyond that of `v = 0` or of
