@@ -15,6 +15,7 @@ mod streaming;
 mod units;
 mod walk;
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -219,6 +220,22 @@ impl Tables {
         QueryError::sql(format!("no column `{name}`\n  expected: {expected}"), help)
     }
 
+    /// The columns of words that a query names.
+    fn words(&self, sql: &str, checked: &CheckedQuery) -> Vec<String> {
+        let named: HashSet<&str> = sql.split(|letter: char| !(letter.is_alphanumeric() || letter == '_')).collect();
+        let read = self.sources.iter().filter(|source| checked.read.contains(&source.name));
+        let schemas = read.filter_map(|source| source.frame.clone().collect_schema().ok());
+        let mut words: Vec<String> = schemas
+            .flat_map(|schema| {
+                let words = schema.iter().filter(|(_, kind)| kind.is_categorical() || kind.is_string());
+                words.map(|(name, _)| name.to_string()).collect::<Vec<_>>()
+            })
+            .filter(|name| named.contains(name.as_str()))
+            .collect();
+        words.dedup();
+        words
+    }
+
     /// The fault of a query.
     fn explain(&self, sql: &str, checked: &CheckedQuery, error: &PolarsError) -> QueryError {
         let text = error.to_string();
@@ -263,7 +280,13 @@ impl Tables {
             (format!("no function `{name}`"), help)
         } else if known("dtype") || known("supertype") || known("cannot compare") || known("cannot cast") {
             let help = "words can be compared and counted; arithmetic, sum and avg need numbers; CAST('inf' AS DOUBLE) is infinity";
-            ("words in place of numbers, or numbers in place of words".to_owned(), help.to_owned())
+            let words = self.words(sql, checked);
+            let found = match words.as_slice() {
+                [] => "words in place of numbers, or numbers in place of words".to_owned(),
+                [column] => format!("`{column}` is a column of words, and is used as one of numbers"),
+                _ => format!("words and numbers are mixed; columns of words: `{}`", words.join("`, `")),
+            };
+            (found, help.to_owned())
         } else {
             (line.to_owned(), "correct the query".to_owned())
         };

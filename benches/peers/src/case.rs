@@ -4,13 +4,20 @@
 
 use std::time::Instant;
 
-use crate::peaks::Peaks;
-use crate::slider::{Slider, State, X, Y, Z};
+use slipsweep::model::StateLaw;
+use slipsweep::stability::step_response::{ScaledBlock, State};
 
-/// A step from steady sliding at `v_i = v_f/32`, in the scaled variables of `slider`.
+use crate::peaks::Peaks;
+
+/// Indices of the scaled force, of the logarithm of the contact lifetime and of that of the velocity in a [`State`].
+const Z: usize = 0;
+const Y: usize = 1;
+pub const X: usize = 2;
+
+/// A step from steady sliding at `v_i = v_f/32`, in the scaled variables of `ScaledBlock`.
 pub struct Case {
     pub name: &'static str,
-    pub slider: Slider,
+    pub block: ScaledBlock,
     /// Time integrated, in `l/v_f`.
     pub t_end: f64,
     /// Values printed by `reference.c`: `[z, y, x]` at `t_end`, and `ln(v/v_f)` at the first peak.
@@ -62,11 +69,12 @@ const A: f64 = 0.005;
 const B: f64 = 0.01;
 const V_F: f64 = 3.2e6;
 const INERTIA: f64 = 2.5e-16 * V_F * V_F;
+const BLOCK: ScaledBlock = ScaledBlock { state_law: StateLaw::Ageing, a: A, b: B, inertia: INERTIA, k: 7.5e-3 };
 
 /// The published case: the time of 50 periods of its limit cycle.
 pub const PAPER: Case = Case {
     name: "paper",
-    slider: Slider { a: A, b: B, inertia: INERTIA, k: 7.5e-3 },
+    block: BLOCK,
     t_end: 50.0 * (1.98357e-6 * V_F),
     end: [2.150556631719136e-3, 1.675067640442670e-1, -3.358494268033420e-2],
     first_peak: 1.880764967911048852,
@@ -76,7 +84,7 @@ pub const PAPER: Case = Case {
 /// Deep stick-slip: half the critical stiffness, 50 cycles.
 pub const STICK_SLIP: Case = Case {
     name: "stick-slip",
-    slider: Slider { a: A, b: B, inertia: INERTIA, k: 0.5 * (B - A) * (1.0 + INERTIA / A) },
+    block: ScaledBlock { k: 0.5 * (B - A) * (1.0 + INERTIA / A), ..BLOCK },
     t_end: 940.0,
     end: [1.148246712724051e-2, 2.377628815983700166, -2.486601127518542733],
     first_peak: 2.427547735588468582,
@@ -86,12 +94,12 @@ pub const STICK_SLIP: Case = Case {
 impl Case {
     /// Steady sliding at `v_i`.
     pub fn start(&self) -> State {
-        self.slider.steady(START)
+        self.block.steady(START)
     }
 
     /// Absolute tolerances of `[z, y, x]`.
     pub fn absolute(&self, tolerance: f64) -> State {
-        [tolerance * self.slider.force(), tolerance, tolerance]
+        [tolerance * self.block.force(), tolerance, tolerance]
     }
 
     /// Greatest error of `ln v` and `ln theta`, and of the force in units of what moves `ln v` by 1.
@@ -102,7 +110,7 @@ impl Case {
 
     /// `[z', y', x']`, for the libraries.
     pub fn slope(&self, state: &[f64], slope: &mut [f64]) {
-        let Slider { a, b, inertia, k } = self.slider;
+        let ScaledBlock { a, b, inertia, k, .. } = self.block;
         let (v, ageing) = (state[X].exp(), (-state[Y]).exp());
         slope[Z] = k * (1.0 - v);
         slope[Y] = ageing - v;
@@ -111,7 +119,7 @@ impl Case {
 
     /// Derivatives of `slope`: rows as there, columns by `[z, y, x]`.
     pub fn jacobian(&self, state: &[f64]) -> [[f64; 3]; 3] {
-        let Slider { a, b, inertia, k } = self.slider;
+        let ScaledBlock { a, b, inertia, k, .. } = self.block;
         let (v, ageing) = (state[X].exp(), (-state[Y]).exp());
         let rate = 1.0 / (inertia * v);
         let pull = state[Z] - a * state[X] - b * state[Y];

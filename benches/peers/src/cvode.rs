@@ -3,9 +3,10 @@
 use std::ffi::OsString;
 use std::process::Command;
 
+use slipsweep::stability::step_response::{ScaledBlock, State};
+
 use crate::case::{Case, Measured, Method};
 use crate::peaks::Peaks;
-use crate::slider::{Slider, State};
 
 pub struct Cvode {
     /// Path of the driver.
@@ -26,9 +27,9 @@ impl Method for Cvode {
     }
 
     fn measure(&self, case: &Case, tolerance: f64) -> Option<Measured> {
-        let Slider { a, b, inertia, k } = case.slider;
+        let ScaledBlock { a, b, inertia, k, .. } = case.block;
         let [z, y, x] = case.start();
-        let arguments = [a, b, inertia, k, z, y, x, case.t_end, case.slider.force(), tolerance];
+        let arguments = [a, b, inertia, k, z, y, x, case.t_end, case.block.force(), tolerance];
         let output = Command::new(&self.driver).args(arguments.map(|number| format!("{number:e}"))).output().ok()?;
         let words = String::from_utf8(output.stdout).ok()?;
         let numbers: Vec<f64> = words.split_whitespace().filter_map(|word| word.parse().ok()).collect();

@@ -6,33 +6,21 @@
 
 mod case;
 mod cvode;
-#[allow(dead_code, unused_imports, reason = "the crate's own sources, for what is used here")]
-#[path = "../../../src/numerics/mod.rs"]
-mod numerics;
 mod ours;
 mod peaks;
-#[allow(dead_code, reason = "the crate's own source, for what is used here")]
-#[path = "../../../src/stability/response/run.rs"]
-mod run;
-#[path = "../../../src/stability/response/series.rs"]
-mod series;
-#[allow(dead_code, reason = "the crate's own source, for what is used here")]
-#[path = "../../../src/stability/response/slider.rs"]
-mod slider;
 mod summary;
 mod with_differential_equations;
 mod with_diffsol;
 
 use case::{Case, Method, PAPER, STICK_SLIP};
 use cvode::Cvode;
-use ours::{Ours, Switching};
+use ours::{Radau, Switching};
 use summary::Point;
 use with_differential_equations::{Dop853, Radau5};
 use with_diffsol::{Bdf, Esdirk34};
 
 fn main() {
-    let ours: Vec<Box<dyn Method>> =
-        vec![Box::new(Switching), Box::new(Ours::<5>)];
+    let ours: Vec<Box<dyn Method>> = vec![Box::new(Switching), Box::new(Radau)];
     let mut libraries: Vec<Box<dyn Method>> = vec![
         Box::new(Bdf),
         Box::new(Esdirk34),

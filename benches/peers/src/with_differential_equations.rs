@@ -5,10 +5,10 @@ use differential_equations::linalg::Matrix;
 use differential_equations::ode::{ODE, OrdinaryNumericalMethod};
 use differential_equations::prelude::{ExplicitRungeKutta, ImplicitRungeKutta};
 use differential_equations::status::Status;
+use slipsweep::stability::step_response::State;
 
-use crate::case::{Case, Method};
+use crate::case::{Case, Method, X};
 use crate::peaks::Peaks;
-use crate::slider::{State, X};
 
 pub struct Radau5 {
     /// Fraction of the tolerance that is left to Newton's method; for 0 the library chooses one that goes with the

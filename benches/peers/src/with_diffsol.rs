@@ -3,10 +3,10 @@
 use diffsol::{
     DiffsolError, NalgebraLU, NalgebraMat, OdeBuilder, OdeEquations, OdeSolverMethod, OdeSolverStopReason, VectorCommon,
 };
+use slipsweep::stability::step_response::State;
 
-use crate::case::{Case, Method};
+use crate::case::{Case, Method, X};
 use crate::peaks::Peaks;
-use crate::slider::{State, X};
 
 pub struct Bdf;
 pub struct Esdirk34;
