@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Table; all by default
     table: Option<String>,
     /// Number of rows
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 10, value_parser = whole::<u32>(0, u32::MAX.into()))]
+    #[arg(short = 'n', long, allow_negative_numbers = true, value_name = "N", default_value_t = 10, value_parser = whole::<u32>(0, u32::MAX.into()))]
     rows: u32,
 }
 

@@ -12,6 +12,9 @@ use crate::sweep::path_hint;
 /// Greatest number of datasets that a message lists. Chosen: they fit on a line.
 const MAX_NAMED_DATASETS: usize = 4;
 
+/// The help where a dataset is expected.
+const HELP_FOR_DATASET: &str = "name a folder that `slipsweep run` wrote";
+
 /// The kind of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -94,8 +97,18 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
         Kind::Trace => ("a trace".to_owned(), format!("`slipsweep plot {shown}` draws it")),
         Kind::Other => other(path),
     };
+    let wants_spec = kinds == [Kind::Spec] && help == HELP_FOR_DATASET;
+    let help = if wants_spec { "name a spec; `slipsweep init NAME` writes one".to_owned() } else { help };
     let expected: Vec<&str> = kinds.iter().map(|kind| kind.words()).collect();
     refused(format!("{shown}: {found}"), expected.join(", or "), help)
+}
+
+/// The datasets in a folder.
+fn datasets_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut datasets: Vec<PathBuf> = entries.filter(|folder| folder.join(MANIFEST).is_file()).collect();
+    datasets.sort();
+    datasets
 }
 
 /// A path of another kind in words, and the help for it.
@@ -105,13 +118,10 @@ fn other(path: &Path) -> (String, String) {
         let dataset = if dataset == Path::new("") { Path::new(".") } else { dataset };
         return ("a piece of a dataset".to_owned(), format!("name the dataset, {}", dataset.display()));
     }
-    let help = "name a folder that `slipsweep run` wrote".to_owned();
+    let help = HELP_FOR_DATASET.to_owned();
     if path.is_dir() {
-        let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
-        let mut datasets: Vec<PathBuf> = entries.filter(|folder| folder.join(MANIFEST).is_file()).collect();
-        datasets.sort();
         let names: Vec<String> =
-            datasets.iter().take(MAX_NAMED_DATASETS).map(|path| path.display().to_string()).collect();
+            datasets_in(path).iter().take(MAX_NAMED_DATASETS).map(|path| path.display().to_string()).collect();
         return match names.is_empty() {
             true => ("a folder without a dataset".to_owned(), help),
             false => ("a folder of datasets".to_owned(), format!("name one of them: {}", names.join(", "))),
@@ -150,5 +160,6 @@ pub fn expect_spec(path: &Path) -> Result<(), Failure> {
 ///
 /// What the path is instead.
 pub fn expect_rows(path: &Path) -> Result<(), Failure> {
-    if Kind::of(path) == Kind::Spec { Err(unexpected(path, &[Kind::Dataset])) } else { Ok(()) }
+    let has_datasets = path.is_dir() && Kind::of(path) == Kind::Other && !datasets_in(path).is_empty();
+    if has_datasets || Kind::of(path) == Kind::Spec { Err(unexpected(path, &[Kind::Dataset])) } else { Ok(()) }
 }

@@ -384,12 +384,21 @@ fn written(result: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
+/// Whether the name of an output file stands for standard output.
+fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
 /// Writes a file completely or not at all; devices and named pipes are written directly.
 fn to_file<E: From<io::Error>>(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<(), E>) -> Result<(), E> {
-    match fs::canonicalize(path) {
-        Ok(real) if fs::metadata(&real)?.is_file() => atomic::write_with(&real, |file| fill(file)),
-        Ok(real) => fill(&mut OpenOptions::new().write(true).open(real)?),
-        // A bare name belongs to the current folder.
-        Err(_) => atomic::write_with(&Path::new(".").join(path), |file| fill(file)),
+    match fs::metadata(path) {
+        Ok(found) if found.is_file() => atomic::write_with(&fs::canonicalize(path)?, |file| fill(file)),
+        // A link such as /dev/stdout may lead to a pipe that has no path.
+        Ok(_) => fill(&mut OpenOptions::new().write(true).open(path)?),
+        Err(_) => {
+            // A bare name belongs to the current folder, and a link to nothing to what it names.
+            let path = fs::read_link(path).map_or_else(|_| path.to_owned(), |target| folder_of(path).join(target));
+            atomic::write_with(&Path::new(".").join(path), |file| fill(file))
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::{Failure, wrong};
+use super::{Failure, is_stdout, wrong};
 
 /// A format of answers.
 pub trait Format: ValueEnum + Copy + PartialEq + Send + Sync + 'static {
@@ -31,7 +31,7 @@ pub struct Output<F: Format> {
 impl<F: Format> Output<F> {
     /// Whether the answer goes to standard output.
     pub fn is_stdout(&self) -> bool {
-        self.out.as_os_str() == "-"
+        is_stdout(&self.out)
     }
 
     /// The format that the arguments select.
@@ -42,6 +42,14 @@ impl<F: Format> Output<F> {
     pub fn format(&self) -> Result<F, Failure> {
         let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
         let known = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));
+        if let (Some(format), Some((ending, of_ending))) = (self.format, known)
+            && (format == F::PARQUET) != (*of_ending == F::PARQUET)
+        {
+            return Err(wrong(format!(
+                "--out {}: the ending .{ending} contradicts --format\n  help: leave out --format, or change the ending",
+                self.out.display()
+            )));
+        }
         let format = match (self.format, known) {
             (Some(format), _) | (None, Some(&(_, format))) => format,
             (None, None) if self.is_stdout() => F::TABLE,

@@ -17,7 +17,7 @@ pub struct Arguments {
     /// The sweep spec, a TOML file
     spec: PathBuf,
     /// Parent folder of the dataset, whose free disk space is compared with the size
-    #[arg(long, value_name = "DIR", default_value = "results")]
+    #[arg(short, long, value_name = "DIR", default_value = "results")]
     out: PathBuf,
 }
 

@@ -1,12 +1,14 @@
 //! `slipsweep plot DATASET|TRACE…`: pictures as SVG, PNG or PDF.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::waiting;
-use super::{EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, refused, say, within, write_file, wrong};
+use super::{
+    EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, is_stdout, put, refused, say, within, write_file, wrong,
+};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError, missing_letters};
 use crate::sweep::units_of;
@@ -39,7 +41,7 @@ pub struct Arguments {
     /// Colour column of a map, or the axis that distinguishes lines
     #[arg(long, visible_alias = "colour", value_name = "COLUMN|AXIS")]
     color: Option<String>,
-    /// A file that ends in .svg, .png or .pdf, or a folder [default: NAME-TABLE.svg]
+    /// A file that ends in .svg, .png or .pdf, or a folder; - is standard output [default: NAME-TABLE.svg]
     #[arg(short, long, value_name = "FILE|DIR")]
     out: Option<PathBuf>,
     /// Format of the pictures in a folder [default: svg]
@@ -108,8 +110,7 @@ impl Arguments {
             _ => "traces".to_owned(),
         };
         let figure = plot::trace::figure(&courses, [self.x.as_deref(), self.y.as_deref()])?;
-        let path = self.write(&figure, &stem, place)?;
-        say(&format!("written to {}\n{}", path.display(), remarks(&figure)))
+        self.write(&figure, "", &stem, place)
     }
 
     fn dataset(&self, path: &Path, place: &OutputTarget) -> Result<(), Failure> {
@@ -142,8 +143,7 @@ impl Arguments {
                 }
                 drawn => drawn?,
             };
-            let path = self.write(&figure, &format!("{}-{table}", source.manifest.name), place)?;
-            say(&format!("{table}: written to {}\n{}", path.display(), remarks(&figure)))?;
+            self.write(&figure, &format!("{table}: "), &format!("{}-{table}", source.manifest.name), place)?;
             pictures += 1;
         }
         match damage {
@@ -163,6 +163,14 @@ impl Arguments {
     fn place(&self) -> Result<OutputTarget, Failure> {
         let format = self.format.unwrap_or(Format::Svg);
         let path = self.out.clone().unwrap_or_default();
+        if is_stdout(&path) {
+            if format != Format::Svg && io::stdout().is_terminal() {
+                return Err(wrong(
+                    "a picture is not written to a terminal\n  help: name a file with --out, or pipe the output",
+                ));
+            }
+            return Ok(OutputTarget { path, is_file: true, format });
+        }
         if path.is_dir() || path.extension().is_none() {
             return Ok(OutputTarget { path, is_file: false, format });
         }
@@ -178,8 +186,8 @@ impl Arguments {
         }
     }
 
-    /// Writes a figure and returns its path.
-    fn write(&self, figure: &Figure, stem: &str, place: &OutputTarget) -> Result<PathBuf, Failure> {
+    /// Writes a figure, and says where; the line begins with `name`.
+    fn write(&self, figure: &Figure, name: &str, stem: &str, place: &OutputTarget) -> Result<(), Failure> {
         let path = match place.is_file {
             true => place.path.clone(),
             false => place.path.join(format!("{stem}.{}", place.format.ending())),
@@ -193,11 +201,14 @@ impl Arguments {
             let _ = writeln!(io::stderr(), "note: the font of PNG and PDF lacks {letters}; an SVG has all letters");
         }
         let bytes = waiting("writing the picture", || place.format.encode(&svg, self.dpi))?;
+        if is_stdout(&path) {
+            return put(&bytes);
+        }
         if !place.is_file {
             fs::create_dir_all(&place.path).map_err(|error| cannot_write(&path, &error))?;
         }
         write_file(&path, &bytes)?;
-        Ok(path)
+        say(&format!("{name}written to {}\n{}", path.display(), remarks(figure)))
     }
 }
 

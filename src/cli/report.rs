@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::summary::SummaryBlock;
 use super::watch::waiting;
-use super::{Failure, dataset, keep_datasets, plan, refused, say, summary, words, write_file};
+use super::{Failure, dataset, is_stdout, keep_datasets, plan, put, refused, say, summary, words, write_file};
 use crate::dataset::{Folder, TableSurvey};
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
@@ -18,7 +18,7 @@ use crate::sweep::{Sweep, estimate, units_of};
 pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
-    /// Output file [default: NAME-report.html]
+    /// Output file; - is standard output [default: NAME-report.html]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -33,7 +33,7 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     // A device or a named pipe has no ending.
-    if !matches!(ending.as_deref(), Some("html" | "htm")) && (path.is_file() || !path.exists()) {
+    if !is_stdout(&path) && !matches!(ending.as_deref(), Some("html" | "htm")) && (path.is_file() || !path.exists()) {
         let found = format!("--out {}: the page is HTML", path.display());
         return Err(refused(found, "a name that ends in .html", "leave out --out, or change the ending"));
     }
@@ -54,6 +54,9 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     plan_of(&mut page, &manifest.spec, &arguments.dataset)?;
     page.heading("Spec");
     page.verbatim(&manifest.spec);
+    if is_stdout(&path) {
+        return put(page.html().as_bytes());
+    }
     write_file(&path, page.html().as_bytes())?;
     say(&format!("written to {}\n", path.display()))
 }

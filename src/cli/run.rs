@@ -1,5 +1,6 @@
 //! `slipsweep run SPEC`: computes the missing parts of a dataset or of one shard, and summarises it.
 
+use std::ffi::OsStr;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,8 @@ use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{waiting, watched};
 use super::{
-    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, load, refused, say, summary, whole, words, wrong,
+    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, is_stdout, load, refused, say, summary, whole, words,
+    wrong,
 };
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
@@ -31,7 +33,7 @@ pub struct Arguments {
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Number of threads, at most 1024 [default: one for each processor]
-    #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1024))]
+    #[arg(long, allow_negative_numbers = true, value_name = "N", value_parser = whole::<u16>(1, 1024))]
     threads: Option<u16>,
     /// Compute only shard I of N, counted from 0; all shards may run at the same time
     #[arg(long, value_name = "I/N")]
@@ -54,7 +56,7 @@ pub struct Arguments {
 /// A spec that is wrong, an interrupted run, failed rows, or, with `--strict`, rows that are not `ok`.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let start = Instant::now();
-    if let Some(out) = arguments.out.as_deref().filter(|out| out.exists() && !out.is_dir()) {
+    if let Some(out) = arguments.out.as_deref().filter(|out| is_stdout(out) || out.exists() && !out.is_dir()) {
         let found = format!("--out {}: not a folder", out.display());
         return Err(refused(found, "a folder, which the run makes if it is missing", "name a folder"));
     }
@@ -197,13 +199,20 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
         return Err(wrong(format!("{}: {message}\n  help: run the spec file of this dataset", path.display())));
     }
     let sweep = Sweep::parse_at(&manifest.spec, &Folder::at(path).manifest_path()).map_err(|error| {
-        let out = folder_of(path).display();
         let what = format!("{}: its spec refers to files that are not in the dataset", path.display());
-        let help = format!("run the spec file: slipsweep run SPEC --out {out}");
-        wrong(format!("{what}\n  found: {error}\n  help: {help}"))
+        wrong(format!("{what}\n  found: {}\n  help: run the spec file: {}", error.found, by_spec(path, &manifest.name)))
     })?;
     let folder = arguments.out.as_deref().map_or(folder, |out| Folder::new(out, &sweep.name));
     Ok((sweep, folder))
+}
+
+/// The commands that continue the dataset in `path`, called `name`, with its spec file: the folder has the name of the dataset then.
+pub fn by_spec(path: &Path, name: &str) -> String {
+    let out = folder_of(path);
+    let home = out.join(name);
+    let is_home = std::path::absolute(path).ok().is_some_and(|path| path.file_name() == Some(OsStr::new(name)));
+    let rename = if is_home { String::new() } else { format!("mv {} {} && ", quoted(path), quoted(&home)) };
+    format!("{rename}slipsweep run SPEC --out {}", quoted(out))
 }
 
 fn explain(error: RunError, caught: Option<i32>, arguments: &Arguments, (there, all): (u64, u64)) -> Failure {
@@ -253,7 +262,9 @@ fn is_passing(error: &io::Error) -> bool {
 fn account(outcome: &Outcome, seconds: f64) -> String {
     let rows: u64 = outcome.tables.iter().map(|table| table.rows).sum();
     if rows == 0 {
-        return "nothing to compute: every part exists\n".to_owned();
+        let is_empty = outcome.tables.iter().all(|table| table.kept == 0);
+        let why = if is_empty { "this shard has no parts" } else { "every part exists" };
+        return format!("nothing to compute: {why}\n");
     }
     let work = outcome.work;
     let (all, rate) = (words::things(rows, "row"), words::count((rows as f64 / seconds) as u64));

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::kind::Kind;
+use super::run::by_spec;
 use super::shards::{quoted, scripts};
 use super::{EXIT_FAILURE, Failure, kind, say, summary, words};
-use crate::dataset::{Build, CheckDepth, Folder, Manifest, Survey, TableSurvey};
-use crate::file::folder_of;
+use crate::dataset::{Build, CheckDepth, Folder, Foreign, Manifest, Survey, TableSurvey};
 use crate::sweep::{Plan, Sweep, shards_with};
 
 /// Arguments of `status`.
@@ -91,15 +91,20 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
     });
     let shown = |paths: &[PathBuf]| -> Vec<String> { paths.iter().map(|path| path.display().to_string()).collect() };
     let file = |table: &TableSurvey, part: u64| folder.part(&table.name, part).display().to_string();
-    let files = |of: fn(&TableSurvey) -> &[(u64, String)]| -> Vec<String> {
-        tables()
-            .flat_map(|table| of(table).iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))))
-            .collect()
+    let damaged = tables()
+        .flat_map(|table| table.damaged.iter().map(move |(part, why)| format!("{}: {why}", file(table, *part))));
+    let foreign = |is_read: bool| {
+        let of = move |table: &TableSurvey| {
+            let all = table.foreign.iter().filter(|(_, why)| matches!(why, Foreign::Unreadable(_)) != is_read);
+            all.map(|(part, why)| format!("{}: {why}", file(table, *part))).collect::<Vec<_>>()
+        };
+        tables().flat_map(of).collect::<Vec<_>>()
     };
-    let lists: [(&str, Vec<String>); 5] = [
+    let lists: [(&str, Vec<String>); 6] = [
         ("missing parts:", missing.collect()),
-        ("damaged parts (the next run recomputes them):", files(|table| &table.damaged)),
-        ("foreign files in the place of parts (a run leaves them alone and fails):", files(|table| &table.foreign)),
+        ("damaged parts (the next run recomputes them):", damaged.collect()),
+        ("foreign files in the place of parts (a run leaves them alone and fails):", foreign(true)),
+        ("files in the place of parts that this user may not read (a run fails):", foreign(false)),
         (
             "temporary files of running or killed processes (the next run removes those of killed ones):",
             shown(&survey.temporary),
@@ -123,10 +128,12 @@ fn faults(folder: &Folder, survey: &Survey) -> String {
 fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
     let mut text = "to finish the dataset:\n".to_owned();
     for table in &survey.tables {
-        for (part, _) in &table.foreign {
+        for (part, why) in &table.foreign {
             let place = Folder::at(path).part(&table.name, *part);
-            let away = place.with_extension("parquet.foreign");
-            let _ = writeln!(text, "  mv {} {}", quoted(&place), quoted(&away));
+            let _ = match why {
+                Foreign::Unreadable(_) => writeln!(text, "  chmod u+r {}", quoted(&place)),
+                _ => writeln!(text, "  mv {} {}", quoted(&place), quoted(&place.with_extension("parquet.foreign"))),
+            };
         }
     }
     let ours = Build::this();
@@ -140,8 +147,7 @@ fn remedy(path: &Path, manifest: &Manifest, survey: &Survey) -> String {
     let plan = sweep.as_ref().map(Plan::new);
     let is_same = plan.as_ref().is_some_and(|plan| plan.tables == manifest.tables);
     let (Some(sweep), Some(plan), true) = (sweep, plan, is_same) else {
-        let out = quoted(folder_of(path));
-        let _ = writeln!(text, "  slipsweep run SPEC --out {out}");
+        let _ = writeln!(text, "  {}", by_spec(path, &manifest.name));
         text.push_str("SPEC is the spec file of this dataset: it refers to files that are not in the dataset\n");
         return text;
     };

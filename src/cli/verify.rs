@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use super::watch::waiting;
 use super::{EXIT_NOT_CONVERGED, Failure, dataset, say, whole, words};
 use crate::dataset::{Cell, Row};
-use crate::verify::{Audit, MAX_DIFFERENCE_RTOLS, Worst, verify as audit};
+use crate::verify::{Audit, Extent, MAX_DIFFERENCE_RTOLS, Worst, verify as audit};
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
@@ -17,10 +17,10 @@ pub struct Arguments {
     /// Folder of the dataset, such as results/NAME
     dataset: PathBuf,
     /// Number of rows to check in each table
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u64>(1, u64::MAX))]
+    #[arg(long, allow_negative_numbers = true, value_name = "N", default_value_t = 100, value_parser = whole::<u64>(1, u64::MAX))]
     sample: u64,
     /// Seed of the sample
-    #[arg(long, value_name = "S", default_value_t = 0, value_parser = whole::<u64>(0, u64::MAX))]
+    #[arg(long, allow_negative_numbers = true, value_name = "S", default_value_t = 0, value_parser = whole::<u64>(0, u64::MAX))]
     seed: u64,
 }
 
@@ -80,8 +80,9 @@ pub fn report(audits: &[Audit]) -> String {
     let mut text = words::aligned(&lines, 0);
     audits.iter().for_each(|audit| text.push_str(&failures(audit)));
     for Audit { table, unchecked, .. } in audits {
-        for (reason, rows) in unchecked {
-            text.push_str(&format!("{table}: {} not checked: {reason}\n", words::things(*rows, "row")));
+        for ((reason, extent), rows) in unchecked {
+            let extent = if *extent == Extent::Part { " in full" } else { "" };
+            text.push_str(&format!("{table}: {} not checked{extent}: {reason}\n", words::things(*rows, "row")));
         }
     }
     if audits.iter().all(|audit| audit.worst.is_empty()) {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::atomic;
 use super::manifest::{Manifest, ManifestTable};
-use super::state::{self, CheckDepth, State};
+use super::state::{self, CheckDepth, Foreign, State};
 use crate::file;
 
 /// The name of the file of the manifest.
@@ -57,10 +57,9 @@ pub enum DatasetError {
     Occupied { folder: String },
     /// A file with the name of a part does not belong to this sweep.
     #[error(
-        "{path}: not a part of this dataset: {why}\n  help: move the file away; `slipsweep run` then computes the part and keeps all \
-         others"
+        "{path}: not a part of this dataset: {why}\n  help: {}", why.help()
     )]
-    ForeignPart { path: String, why: String },
+    ForeignPart { path: String, why: Foreign },
     /// A part is damaged.
     #[error(
         "{path}: the part is damaged: {why}\n  help: `slipsweep run {dataset}` recomputes it and keeps all intact parts"
@@ -73,10 +72,7 @@ pub enum DatasetError {
     )]
     Manifest { path: String, why: String },
     /// An error of the operating system.
-    #[error(
-        "{path}: cannot {action}: {source}\n  help: solve this and run the same command again, which keeps finished parts; or write \
-         elsewhere with --out DIR"
-    )]
+    #[error("{path}: cannot {action}: {source}\n  help: {}", io_help(action, source))]
     Io { path: String, action: &'static str, source: io::Error },
     /// A sample of a table could not be encoded.
     #[error("cannot encode a sample: {0}")]
@@ -90,6 +86,16 @@ impl DatasetError {
     /// Part number `part` of `table` could not be encoded.
     pub fn encode(folder: &Folder, table: &str, part: u64, source: parquet::errors::ParquetError) -> DatasetError {
         DatasetError::Encode { path: folder.part(table, part).display().to_string(), source }
+    }
+}
+
+/// What to do after an error of the operating system.
+fn io_help(action: &str, source: &io::Error) -> &'static str {
+    match (action, source.kind()) {
+        (_, io::ErrorKind::NotADirectory) => "a folder of this path is a file: write elsewhere with --out DIR",
+        ("read", io::ErrorKind::PermissionDenied) => "give yourself permission to read it",
+        ("read", _) => "solve this and run the same command again",
+        _ => "solve this and run the same command again, which keeps finished parts; or write elsewhere with --out DIR",
     }
 }
 

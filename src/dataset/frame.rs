@@ -9,6 +9,7 @@ use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::statistics::Statistics;
+use parquet::schema::types::SchemaDescriptor;
 
 pub use super::cell::Cells;
 
@@ -166,6 +167,12 @@ pub fn first(path: &Path, count: usize) -> Result<Frame, FrameError> {
     open(path, None, |all| all.with_limit(count))
 }
 
+/// The columns `names` of a file. `ProjectionMask::columns` takes a dot in a name as the name of a field of a group.
+pub fn projection(schema: &SchemaDescriptor, names: &[&str]) -> ProjectionMask {
+    let fields = schema.root_schema().get_fields().iter().enumerate();
+    ProjectionMask::roots(schema, fields.filter(|(_, field)| names.contains(&field.name())).map(|(place, _)| place))
+}
+
 /// A reader of some rows of a file, or all.
 type Builder = ParquetRecordBatchReaderBuilder<File>;
 
@@ -176,7 +183,7 @@ fn open(path: &Path, names: Option<&[&str]>, select: impl FnOnce(Builder) -> Bui
         let metadata = coded(&file)?;
         let mut builder = select(Builder::new_with_metadata(file, metadata).with_batch_size(ROWS_AT_ONCE));
         if let Some(names) = names {
-            let mask = ProjectionMask::columns(builder.parquet_schema(), names.iter().copied());
+            let mask = projection(builder.parquet_schema(), names);
             builder = builder.with_projection(mask);
         }
         let reader = builder.build()?;

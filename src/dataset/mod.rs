@@ -39,9 +39,7 @@ pub(crate) use layout::{field, label};
 pub use manifest::{Build, Manifest, ManifestTable};
 pub use part::encode;
 pub use session::{Concurrency, Session};
-#[cfg(feature = "read")]
-pub(crate) use state::OTHER_SWEEP;
-pub use state::{CheckDepth, State};
+pub use state::{CheckDepth, Foreign, State};
 pub use statistics::{Counts, MAX_KEPT_ROWS, Row as StatisticsRow, TableStatistics};
 #[cfg(feature = "read")]
 pub use survey::{Survey, TableSurvey};

@@ -32,9 +32,36 @@ pub enum State {
     /// The expected part.
     There { statistics: Box<TableStatistics> },
     /// A file of another sweep, version or program, which may be valuable and is never replaced.
-    Foreign { why: String },
+    Foreign { why: Foreign },
     /// A damaged part, which a run replaces.
     Damaged { why: String },
+}
+
+/// Why a file in the place of a part is not the expected part.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Foreign {
+    /// It is a part of slipsweep, but not this one.
+    #[error("it belongs to another place, sweep, version or numerics revision")]
+    OtherPart,
+    /// Another program wrote it, such as a part that a user edited.
+    #[error("a Parquet file that slipsweep did not write")]
+    OtherProgram,
+    /// It is no file.
+    #[error("{0}")]
+    NotAFile(String),
+    /// This user cannot read it; it may be the part.
+    #[error("it cannot be read: {0}")]
+    Unreadable(String),
+}
+
+impl Foreign {
+    /// What to do with the file.
+    pub(super) fn help(&self) -> &'static str {
+        match self {
+            Foreign::Unreadable(_) => "give yourself permission to read it",
+            _ => "move the file away; `slipsweep run` then computes the part and keeps all others",
+        }
+    }
 }
 
 /// The state of part number `part` of `table` in the dataset of `manifest`, whose file is `path`.
@@ -57,7 +84,7 @@ fn sealed_entries(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     let entries = entries(&metadata);
     match sound(|| checksum::is_head_intact(&file, &metadata)) {
         Ok(Some(true)) => Ok(Some(entries)),
-        Ok(None) if Footer::from_entries(&entries).is_none() => foreign(OTHER_PROGRAM),
+        Ok(None) if Footer::from_entries(&entries).is_none() => foreign(Foreign::OtherProgram),
         Ok(_) => damaged("the checksum of its footer and page headers does not match"),
         Err(error) => damaged(&error.to_string()),
     }
@@ -76,8 +103,8 @@ fn there<T>(read: io::Result<T>) -> Result<Option<T>, State> {
     };
     match error.kind() {
         io::ErrorKind::NotFound => Ok(None),
-        // A file that this user cannot read may be intact.
-        io::ErrorKind::InvalidInput | io::ErrorKind::PermissionDenied => foreign(&error.to_string()),
+        io::ErrorKind::InvalidInput => foreign(Foreign::NotAFile(error.to_string())),
+        io::ErrorKind::PermissionDenied => foreign(Foreign::Unreadable(error.to_string())),
         _ => damaged(&format!("it cannot be read: {error}")),
     }
 }
@@ -96,14 +123,8 @@ fn whole(path: &Path) -> Result<Option<Vec<KeyValue>>, State> {
     Ok(Some(entries))
 }
 
-/// Why a file of another program is foreign, such as a part that a user edited.
-const OTHER_PROGRAM: &str = "a Parquet file that slipsweep did not write";
-
-/// Why a part of slipsweep is foreign.
-pub const OTHER_SWEEP: &str = "it belongs to another place, sweep, version or numerics revision";
-
-fn foreign<T>(why: &str) -> Result<T, State> {
-    Err(State::Foreign { why: why.to_owned() })
+fn foreign<T>(why: Foreign) -> Result<T, State> {
+    Err(State::Foreign { why })
 }
 
 fn damaged<T>(why: &str) -> Result<T, State> {
@@ -122,10 +143,10 @@ fn entries(metadata: &ParquetMetaData) -> Vec<KeyValue> {
 /// The statistics in the footer of a file, if it is that of the expected part.
 fn belongs(entries: &[KeyValue], manifest: &Manifest, table: &str, part: u64) -> Result<TableStatistics, State> {
     let (Some(found), Some(statistics)) = (Footer::from_entries(entries), Footer::statistics(entries)) else {
-        return foreign(OTHER_PROGRAM);
+        return foreign(Foreign::OtherProgram);
     };
     let is_expected = manifest.table(table).is_some_and(|planned| {
         found.planned() == Some(planned) && found.table == table && found.rows == planned.rows_of(part)
     });
-    if is_expected && found.manifest.build == manifest.build { Ok(statistics) } else { foreign(OTHER_SWEEP) }
+    if is_expected && found.manifest.build == manifest.build { Ok(statistics) } else { foreign(Foreign::OtherPart) }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::folder::Folder;
 use super::manifest::Manifest;
-use super::state::{CheckDepth, State};
+use super::state::{CheckDepth, Foreign, State};
 use super::statistics::TableStatistics;
 
 /// The survey of a dataset folder.
@@ -38,7 +38,7 @@ pub struct TableSurvey {
     /// Damaged parts, with the kind of damage.
     pub damaged: Vec<(u64, String)>,
     /// Foreign parts, with the reason.
-    pub foreign: Vec<(u64, String)>,
+    pub foreign: Vec<(u64, Foreign)>,
     /// The statistics of the existing parts.
     pub statistics: TableStatistics,
 }

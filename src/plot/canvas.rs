@@ -54,6 +54,14 @@ pub struct Area {
 }
 
 impl Area {
+    /// Whether it has points in common with another area.
+    pub fn meets(&self, other: &Area) -> bool {
+        self.x < other.x + other.width
+            && other.x < self.x + self.width
+            && self.y < other.y + other.height
+            && other.y < self.y + self.height
+    }
+
     fn attributes(&self) -> String {
         let Area { x, y, width, height } = self;
         format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(*x), at(*y), at(*width), at(*height))

@@ -508,6 +508,7 @@ impl Panel {
         // Marks on the frame are not clipped.
         canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         self.layers.iter().for_each(|layer| self.mark(canvas, area, layer));
+        self.draw_names(canvas, area);
         self.draw_words_above(canvas, area);
         ticks.x.draw_below(canvas, area, ticks.x_label);
         ticks.y.draw_side_axis(canvas, area, false, ticks.y_label);
@@ -570,24 +571,49 @@ impl Panel {
         }
     }
 
+    /// The position of a point on the page, if it is inside.
+    fn inside(&self, area: Area, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+        let is_inside = |fraction: f64| (-1e-9..=1.0 + 1e-9).contains(&fraction);
+        (is_inside(self.x.scale.fraction(x)) && is_inside(self.y.scale.fraction(y))).then(|| self.place(area, (x, y)))
+    }
+
+    /// Draws the name of each row once, beside one of its marks, where it meets neither a mark nor another name; a name without space is left out.
+    fn draw_names(&self, canvas: &mut Canvas, area: Area) {
+        let around = |(x, y): (f64, f64)| Area { x: x - 2.0, y: y - 2.0, width: 4.0, height: 4.0 };
+        let marks =
+            self.layers.iter().filter_map(|layer| if let Layer::Marks(marks) = layer { Some(marks) } else { None });
+        let mut taken: Vec<Area> = marks.flatten().filter_map(|(at, _)| self.inside(area, *at)).map(around).collect();
+        let mut drawn: Vec<&str> = Vec::new();
+        let names =
+            self.layers.iter().filter_map(|layer| if let Layer::Names(names) = layer { Some(names) } else { None });
+        for (at, name) in names.flatten() {
+            let Some((x, y)) = self.inside(area, *at).filter(|_| !drawn.contains(&name.as_str())) else { continue };
+            let wide = NOTE_SIZE * label::width(name);
+            let beside =
+                [(x + 3.5, y), (x - 3.5 - wide, y), (x - 0.5 * wide, y - NOTE_SIZE), (x - 0.5 * wide, y + NOTE_SIZE)];
+            let boxes = beside.map(|(x, y)| Area { x, y: y - 0.5 * NOTE_SIZE, width: wide, height: NOTE_SIZE });
+            let is_free = |place: &&Area| {
+                let is_within = place.x >= area.x && place.x + wide <= area.x + area.width && place.y >= area.y;
+                is_within
+                    && place.y + NOTE_SIZE <= area.y + area.height
+                    && !taken.iter().any(|other| place.meets(other))
+            };
+            let Some(place) = boxes.iter().find(is_free).copied() else { continue };
+            canvas.text((place.x, place.y + 0.85 * NOTE_SIZE), name, &Text { colour: "#333", ..NOTE });
+            taken.push(place);
+            drawn.push(name);
+        }
+    }
+
     /// Draws the marks of points inside, without clipping.
     fn mark(&self, canvas: &mut Canvas, area: Area, layer: &Layer) {
-        let inside = |&(x, y): &(f64, f64)| {
-            let is_inside = |fraction: f64| (-1e-9..=1.0 + 1e-9).contains(&fraction);
-            (is_inside(self.x.scale.fraction(x)) && is_inside(self.y.scale.fraction(y)))
-                .then(|| self.place(area, (x, y)))
-        };
         match layer {
             Layer::Marks(marks) => {
-                let marks = marks.iter().filter_map(|(at, symbol)| Some((inside(at)?, symbol)));
+                let marks = marks.iter().filter_map(|(at, symbol)| Some((self.inside(area, *at)?, symbol)));
                 marks.for_each(|(place, symbol)| symbol.draw(canvas, place));
             }
-            Layer::Names(names) => {
-                let names = names.iter().filter_map(|(at, name)| Some((inside(at)?, name)));
-                names.for_each(|(place, name)| draw_name(canvas, area, place, name));
-            }
             Layer::Star(at) => {
-                if let Some(place) = inside(at) {
+                if let Some(place) = self.inside(area, *at) {
                     draw_clear_star(canvas, area, place);
                 }
             }
@@ -681,15 +707,6 @@ fn pieces(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
 fn draw_contour(canvas: &mut Canvas, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
     canvas.lines(lines, &Stroke::solid("#fff", stroke.width + 1.2));
     canvas.lines(lines, stroke);
-}
-
-/// Draws the name of a row near its mark, on the side with space.
-fn draw_name(canvas: &mut Canvas, area: Area, (x, y): (f64, f64), name: &str) {
-    let wide = NOTE_SIZE * label::width(name) + 4.0;
-    let (place, anchor) =
-        if x + wide > area.x + area.width { (x - 3.5, Anchor::End) } else { (x + 3.5, Anchor::Start) };
-    let line = (y + 0.35 * NOTE_SIZE).clamp(area.y + NOTE_SIZE, area.y + area.height - 2.0);
-    canvas.text((place, line), name, &Text { anchor, colour: "#333", ..NOTE });
 }
 
 /// Draws a star clear of the frame: near the frame it is moved inside, and a line leads to its position.

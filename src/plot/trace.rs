@@ -93,11 +93,14 @@ impl TraceFile {
         let parameters = Quantity::ALL.into_iter().filter(|quantity| *quantity != Quantity::Sampling);
         let parameters = parameters.filter_map(|quantity| number(quantity.name()));
         let after = |key: &str| fact(key).map_or(String::new(), |word| format!(", {word} {key}"));
+        let is_unbounded = fact("velocity_bound").is_some_and(|bound| bound == "false");
+        let floor = if is_unbounded { ", no velocity floor" } else { "" };
         let protocol = fact("protocol").map_or(stem, Clone::clone);
         let pulses = fact("chatter_pulses")
             .and_then(|count| count.parse::<f64>().ok())
             .map_or(String::new(), |count| format!(", chattering shown as {count} pulses"));
-        let name = format!("{protocol}{}{}{pulses}", after("law"), after("loop"));
+        let label = fact("label").map_or(String::new(), |label| format!(", {label}"));
+        let name = format!("{protocol}{label}{}{}{}{floor}{pulses}", after("law"), after("friction"), after("loop"));
         let name = label::literal(&name.replace('_', " "));
         let points = fact("points").and_then(|points| points.parse().ok());
         TraceFile { name, parameters: parameters.collect(), columns, points }
@@ -143,7 +146,7 @@ fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts.into_iter().filter_map(fact).collect()))
 }
 
-/// The columns of a CSV, and its comments `# key = value`. Without a comment on units, the units are scaled.
+/// The columns of a CSV, and its comments `# key = value`. Without a comment on units, those of a trace of slipsweep are scaled, and others unknown.
 fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let text = file::open(path)
         .and_then(std::io::read_to_string)
@@ -153,13 +156,14 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
         .filter_map(|line| line.trim_start_matches('#').split_once('='))
         .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
         .collect();
-    let units = facts.iter().find(|(key, _)| key == "units").map_or("", |(_, units)| units.as_str());
+    let fact = |name: &str| facts.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str());
+    let (units, is_ours) = (fact("units").unwrap_or_default(), fact("protocol").is_some());
     let units: Vec<&str> = units.split(", ").collect();
     let mut lines = text.lines().enumerate().skip_while(|(_, line)| line.starts_with('#'));
     let names = lines.next().map_or("", |(_, line)| line);
     let column = |(place, name): (usize, &str)| {
         let unit = units.get(place).copied().filter(|known| !known.is_empty());
-        let scaled = || COLUMNS.iter().position(|column| column.name == name).map_or("", trace::unit);
+        let scaled = || COLUMNS.iter().position(|column| is_ours && column.name == name).map_or("", trace::unit);
         let unit = unit.unwrap_or_else(scaled);
         Column { name: name.to_owned(), unit: unit.to_owned(), cells: Vec::new() }
     };

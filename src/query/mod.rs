@@ -199,7 +199,9 @@ impl Tables {
             let table = table::find(&source.name);
             table.is_some_and(|table| table.columns().iter().any(|column| column.name == name))
         };
+        let spaced = columns().find(|column| column.split_once(' ').is_some_and(|(first, _)| first == name));
         let help = match nearest(name, columns()) {
+            _ if spaced.is_some() => format!("a name with spaces goes in double quotes: \"{}\"", spaced.unwrap_or_default()),
             _ if ["inf", "infinity", "nan"].contains(&name.to_lowercase().as_str()) => {
                 format!("CAST('{name}' AS DOUBLE) is this number")
             }

@@ -14,7 +14,6 @@ use arrow_array::types::{
 use arrow_array::{Array, BooleanArray, RecordBatch, new_empty_array};
 use arrow_schema::{DataType as ArrowType, FieldRef, Fields, Schema as ArrowSchema};
 use arrow_select::filter::filter_record_batch;
-use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
@@ -249,7 +248,8 @@ impl Files {
         // Statistics of other writers exclude NaN, which is the greatest number in polars.
         let is_ours = is_ours(&metadata);
         let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
-        let mask = ProjectionMask::columns(metadata.parquet_schema(), names.iter().copied());
+        let wanted: Vec<&str> = names.iter().copied().collect();
+        let mask = dataset::frame::projection(metadata.parquet_schema(), &wanted);
         let mut missing = most;
         for (index, group) in metadata.metadata().row_groups().iter().enumerate() {
             if missing == Some(0) {

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::axis::{Sampled, Written, read};
 use super::error::{SpecError, all, refuse, unknown};
 use super::points;
+use super::read::{HELP_FOR_GRID_KEY, is_grid_key};
 use super::spec::BlockSpec;
 use super::units::legal;
 use crate::grid::{Axis, Block, Derived, Design, Expression, Factor, Fault, Quantity, Scale, Values, first_wrong};
@@ -26,7 +27,9 @@ pub fn check(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Re
     let axes = spec.axes.iter().map(|(name, axis)| {
         let key = format!("{prefix}axes.{name}");
         let Some(quantity) = Quantity::from_name(name) else {
-            return Err(unknown(key, "axis", name, &Quantity::ALL.map(Quantity::name)));
+            let is_grid_key = is_grid_key(&key);
+            let fault = unknown(key, "axis", name, &Quantity::ALL.map(Quantity::name));
+            return Err(if is_grid_key { SpecError { help: HELP_FOR_GRID_KEY.into(), ..fault } } else { fault });
         };
         if held.contains(&quantity) {
             let found = format!("`{name}` is also a column of `points`");

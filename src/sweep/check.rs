@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::{self, Read};
+use std::iter;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -121,7 +122,19 @@ impl Sweep {
     ///
     /// The faults of the spec, with their lines.
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        Sweep::check(&Spec::parse(text)?, text, folder)
+        match Spec::recovered(text) {
+            Ok(spec) => Sweep::check(&spec, text, folder),
+            Err((faults, spec)) => {
+                // Without an axis, others may depend on it.
+                let spec =
+                    spec.filter(|_| !iter::once(&faults).chain(&faults.others).any(|fault| fault.key.contains("axes")));
+                let others = spec.and_then(|spec| independent(&spec, folder).err());
+                Err(match others {
+                    Some(others) => SpecError::and(Some(faults), others.located(text)),
+                    None => faults,
+                })
+            }
+        }
     }
 
     /// Checks `spec`, read from `text`; files that it names are relative to `folder`.
@@ -134,15 +147,7 @@ impl Sweep {
     }
 
     fn checked(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        let (mut known_units, mut friction, mut grid) = (Units::Scaled, Friction::default(), Vec::new());
-        let axes = units(&spec.model).and_then(|units| {
-            known_units = units;
-            grid = blocks(spec, &units, folder)?;
-            Ok(())
-        });
-        let form = laws::friction(&spec.model).map(|form| friction = form);
-        all([check_name(&spec.name), axes, check_rtol("accuracy.rtol", spec.accuracy.rtol), form, check_tables(spec)])?;
-        let grid = Grid { blocks: grid.into_iter().map(Arc::new).collect(), units: known_units };
+        let (grid, friction) = independent(spec, folder)?;
         let requests = all(spec.tables.iter().map(|(name, table)| request(name, table, spec, friction, &grid)))?;
         let warnings = doubtful_scales(&spec.model).into_iter().chain(unused(spec, &grid, &requests));
         // A condition may drop the points outside.
@@ -290,6 +295,19 @@ pub fn check_name(name: &str) -> Result<(), SpecError> {
     }
     let expected = format!("at most {MAX_NAME_BYTES} letters from a to z, digits, '-', '_' and '.', the first not '.'");
     refuse("name", format!("`{name}` cannot name a folder"), expected, "choose another name")
+}
+
+/// The grid and the form of friction of `spec`, after the checks that do not depend on each other.
+fn independent(spec: &Spec, folder: &Path) -> Result<(Grid, Friction), SpecError> {
+    let (mut known_units, mut friction, mut grid) = (Units::Scaled, Friction::default(), Vec::new());
+    let axes = units(&spec.model).and_then(|units| {
+        known_units = units;
+        grid = blocks(spec, &units, folder)?;
+        Ok(())
+    });
+    let form = laws::friction(&spec.model).map(|form| friction = form);
+    all([check_name(&spec.name), axes, check_rtol("accuracy.rtol", spec.accuracy.rtol), form, check_tables(spec)])?;
+    Ok((Grid { blocks: grid.into_iter().map(Arc::new).collect(), units: known_units }, friction))
 }
 
 /// The blocks of `spec`.

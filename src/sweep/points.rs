@@ -56,14 +56,19 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
                 factor.labels.push(Label { name, words: words.into_iter().collect(), places });
             }
             Cells::Label { .. } => {
-                let error = unknown("points".to_owned(), "axis", &name, &Quantity::ALL.map(Quantity::name));
-                let expected = format!("{}; or a label: text, such as \"S1\", or numbers in quotes", error.expected);
-                let found = format!("{}: {}", path.display(), error.found);
-                return Err(SpecError { found: found.into(), expected: expected.into(), ..error });
+                return Err(unknown_axis(path, &name));
             }
         }
     }
     Ok(factor)
+}
+
+/// The fault of a column of numbers that is no axis.
+fn unknown_axis(path: &Path, name: &str) -> SpecError {
+    let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
+    let expected = format!("{}; or a label: text, such as \"S1\", or numbers in quotes", error.expected);
+    let found = format!("{}: {}", path.display(), error.found);
+    SpecError { found: found.into(), expected: expected.into(), ..error }
 }
 
 /// Greatest number of points. Chosen: the values of all 16 quantities take 512 MiB of memory.
@@ -91,6 +96,9 @@ fn check_count(path: &Path, count: usize) -> Result<(), SpecError> {
 fn too_many(path: &Path, found: &str, most: u64) -> SpecError {
     fault(format!("{}: {found}", path.display()), &format!("at most {most}"), "take fewer points, or several sweeps")
 }
+
+/// Greatest length of a label and of its name, in characters. Chosen: it fits a line of a picture.
+const MAX_LABEL_CHARS: usize = 200;
 
 /// A column of a file of points.
 struct Column {
@@ -123,6 +131,10 @@ impl Column {
     fn push(&mut self, place: impl Fn() -> String, cell: &str, units: &Units) -> Result<(), SpecError> {
         match &mut self.cells {
             Cells::Label { places, .. } if cell.is_empty() => places.push(None),
+            Cells::Label { .. } if cell.chars().count() > MAX_LABEL_CHARS => {
+                let found = format!("a label of {} characters", cell.chars().count());
+                return self.wrong(place, &found, &format!("at most {MAX_LABEL_CHARS} characters"));
+            }
             Cells::Label { words, places, has_text } => {
                 *has_text |= cell.parse::<f64>().is_err();
                 let place = words.get_index_of(cell).unwrap_or_else(|| words.insert_full(cell.to_owned()).0);
@@ -223,8 +235,12 @@ fn cells_of<'a>(place: &str, line: &'a str) -> Result<Vec<Cow<'a, str>>, SpecErr
         }
         let after = end.map(|end| (&quoted[..end], quoted[end + 1..].trim_start()));
         let Some((cell, after)) = after.filter(|(_, after)| after.is_empty() || after.starts_with(',')) else {
-            let found = format!("{place}: the quote in `{line}` is not closed");
-            return Err(fault(found, "quotes around a whole cell", "close the quote, or remove it"));
+            let found = format!("{place}: the quote in `{line}` is not closed on its line");
+            return Err(fault(
+                found,
+                "quotes around a whole cell, without line breaks",
+                "close the quote, or remove it",
+            ));
         };
         cells.push(cell.replace("\"\"", "\"").trim().to_owned().into());
         rest = after.strip_prefix(',');
@@ -255,9 +271,14 @@ fn parquet(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecEr
             }
             let numbers =
                 numbers(array).filter(|_| matches!(&column.cells, Cells::Axis(axis, _) if axis.words().is_empty()));
-            let Some(numbers) = numbers.filter(|_| array.null_count() == 0) else {
-                let held =
-                    if array.null_count() > 0 { "missing values".to_owned() } else { array.data_type().to_string() };
+            if let Some(row) = (0..array.len()).find(|&row| array.is_null(row)) {
+                column.wrong(|| place(row), "a missing value", "a value for each point")?;
+            }
+            let Some(numbers) = numbers else {
+                if matches!(column.cells, Cells::Label { .. }) && array.data_type().is_numeric() {
+                    return Err(unknown_axis(path, &column.name));
+                }
+                let held = array.data_type();
                 let found = format!("{name}: column `{}` holds {held}", column.name);
                 let expected = "numbers for an axis, text for an axis of words or a label";
                 return Err(fault(found, expected, "write the column in this type, or remove it"));
@@ -329,6 +350,10 @@ fn header<'a>(place: &str, names: impl Iterator<Item = &'a str>) -> Result<Vec<C
             let found = format!("{place}: columns or lines that end with ; or a tab, in `{name}`");
             let help = "save it as CSV with commas and decimal points; commas in numbers are not decimal points";
             return Err(fault(found, "columns that end with commas, lines with newlines", help));
+        }
+        if name.chars().count() > MAX_LABEL_CHARS {
+            let found = format!("{place}: a column with a name of {} characters", name.chars().count());
+            return Err(fault(found, &format!("at most {MAX_LABEL_CHARS} characters"), "shorten the name"));
         }
         if quantity.is_none() && taken.iter().any(|taken| taken.eq_ignore_ascii_case(name)) {
             let found = format!("{place}: the label `{name}` has the name of a column of a table");

@@ -16,20 +16,25 @@ impl Spec {
     ///
     /// The syntax error, or unknown and missing keys and values of the wrong type.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
+        Spec::recovered(text).map_err(|(faults, _)| faults)
+    }
+
+    /// Reads a spec from TOML; with the faults of keys and types, the spec without these keys if it is complete.
+    pub(super) fn recovered(text: &str) -> Result<Spec, (SpecError, Option<Spec>)> {
         let document = DeTable::parse(text).map_err(|error| {
             let help = "put text and expressions in \"quotes\", close brackets, write decimals with a point, commas between values, and each key once";
             let fault =
                 SpecError::new("", format!("not TOML: {}", error.message()), "key = value, [table] or # comment", help);
-            SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }
+            (SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }, None)
         })?;
         let document = document.into_inner();
         let (mut rest, mut known) = (text.to_owned(), None);
         loop {
             let error: toml::de::Error = match (toml::from_str(&rest), known) {
                 (Ok(spec), None) => return Ok(spec),
-                (Ok(_), Some(faults)) => return Err(faults),
+                (Ok(spec), Some(faults)) => return Err((faults, Some(spec))),
                 // Its entry may be the blank one.
-                (Err(error), Some(faults)) if is_missing(&error) => return Err(faults),
+                (Err(error), Some(faults)) if is_missing(&error) => return Err((faults, None)),
                 (Err(error), faults) => {
                     known = faults;
                     error
@@ -43,7 +48,7 @@ impl Spec {
             let faults = SpecError::and(known, fault);
             // Without the entry other faults show, at the same places.
             if !entry.is_some_and(|entry| blank(&mut rest, entry)) || faults.others.len() + 1 == MAX_FAULTS {
-                return Err(faults);
+                return Err((faults, None));
             }
             known = Some(faults);
         }
@@ -67,6 +72,25 @@ fn blank(text: &mut String, entry: Range<usize>) -> bool {
 pub const HELP_FOR_NUMBER: &str =
     "write numbers without quotes or units, inf for no bound, an expression as { expr = \"10 * v_i\" }";
 
+/// The help for an unknown key of an axis.
+const HELP_FOR_FORM: &str = "a range is { linspace = [first, last, count] } or { geomspace = [first, last, count] }";
+
+/// The keys of other sections than the top one.
+const SECTIONS: [(&str, &[&str]); 3] = [
+    ("[accuracy]", &["rtol"]),
+    ("[model]", &["velocity_bound", "friction", "units", "mu_0", "l", "v_0", "normal_stress"]),
+    ("[tables.NAME]", &["columns", "reduce"]),
+];
+
+/// The help for a key of the grid in the section of its axes.
+pub const HELP_FOR_GRID_KEY: &str = "write this key above the line [axes]; it is no axis";
+
+/// Whether a key below `axes` is one of the grid.
+pub fn is_grid_key(key: &str) -> bool {
+    let name = key.split_once("axes.").map(|(_, name)| name.split(['.', '[']).next().unwrap_or_default());
+    name.is_some_and(|name| ["where", "points", "zip"].contains(&name))
+}
+
 /// The fault that the parser reports with `message` for the value at `key`, written in `span` of `text`.
 fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecError {
     if let Some(name) = message.strip_prefix("missing field ") {
@@ -75,8 +99,13 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
     if message.starts_with("unknown field ") {
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let fault = unknown(key, "key", names[0], &names[1..]);
-        return match Quantity::from_name(names[0]) {
-            Some(_) => SpecError { help: "axes go below the line [axes], or [block.axes] in a block".into(), ..fault },
+        let home = SECTIONS.iter().find(|(_, keys)| keys.contains(&names[0])).map(|(section, _)| *section);
+        let home = Quantity::from_name(names[0]).map(|_| "the line [axes], or [block.axes] in a block").or(home);
+        return match home {
+            _ if fault.key.contains("axes.") && !fault.help.starts_with("did you mean") => {
+                SpecError { help: HELP_FOR_FORM.into(), ..fault }
+            }
+            Some(home) => SpecError { help: format!("`{}` goes below {home}", names[0]).into(), ..fault },
             None => fault,
         };
     }
@@ -90,6 +119,9 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
         expected => expected,
     };
     let help = match expected {
+        _ if is_grid_key(&key) => HELP_FOR_GRID_KEY,
+        "a list" if key == "block" => "write [[block]], with two brackets, above each block",
+        "a list" if key.starts_with("zip") => "write a list of lists, such as zip = [[\"a\", \"b\"]]",
         "a list" => "write values in [brackets], and a block as [[block]]",
         expected if expected.starts_with("a number") => HELP_FOR_NUMBER,
         _ => "change the value",

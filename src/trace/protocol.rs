@@ -516,8 +516,8 @@ fn gap(
 
 fn scaled(a_2: f64, a_3: f64) -> Vec<Parameter> {
     vec![
-        Parameter::new("alpha_2", a_2, "1/t_f", "coefficient of t in theta, in 1/t_f"),
-        Parameter::new("alpha_3", a_3, "1/t_f^2", "coefficient of t^2 in theta, in 1/t_f^2"),
+        Parameter::new("alpha_2", a_2, "1/t_f", "coefficient of t in theta"),
+        Parameter::new("alpha_3", a_3, "1/t_f^2", "coefficient of t^2 in theta"),
     ]
 }
 

@@ -47,10 +47,19 @@ pub struct Audit {
     pub errors: usize,
     /// For each column the row with the greatest difference, worst first.
     pub worst: Vec<Worst>,
-    /// Rows that were not checked, by reason.
-    pub unchecked: IndexMap<&'static str, u64>,
+    /// Rows that were not checked, or not in full, by reason.
+    pub unchecked: IndexMap<(&'static str, Extent), u64>,
     /// What is wrong with a part that cannot be read; its rows are not checked.
     pub fault: Option<String>,
+}
+
+/// How much of a row was not checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Extent {
+    /// All of its numbers.
+    Whole,
+    /// Some of its numbers.
+    Part,
 }
 
 /// The greatest difference in a column.
@@ -154,15 +163,16 @@ impl Audit {
     /// The audit of a table of which so many rows of the sample are missing.
     fn finished(mut self, missing: u64) -> Audit {
         if missing > 0 {
-            self.unchecked.insert("their part is missing; `slipsweep run` computes it", missing);
+            self.unchecked.insert(("their part is missing; `slipsweep run` computes it", Extent::Whole), missing);
         }
         self.worst.sort_by(|a, b| b.difference.total_cmp(&a.difference).then(a.number.cmp(&b.number)));
         self
     }
 
     fn add(&mut self, number: u64, row: &Row, differences: Vec<Difference>, unchecked: Vec<&'static str>) {
+        let extent = if differences.is_empty() { Extent::Whole } else { Extent::Part };
         for reason in unchecked {
-            *self.unchecked.entry(reason).or_default() += 1;
+            *self.unchecked.entry((reason, extent)).or_default() += 1;
         }
         for Difference { column, size, expected } in differences {
             let difference = size / self.rtol;

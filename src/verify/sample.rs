@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::dataset::{CheckDepth, Folder, Manifest, ManifestTable, OTHER_SWEEP, Row, State, frame};
+use crate::dataset::{CheckDepth, Folder, Foreign, Manifest, ManifestTable, Row, State, frame};
 use crate::grid::{SPLIT_MIX_INCREMENT, mixed};
 
 /// `count` different row numbers below `rows`, ascending (Floyd's sampling); all if there are no more.
@@ -46,7 +46,9 @@ pub fn rows(folder: &Folder, manifest: &Manifest, table: &ManifestTable, count: 
             // The numbers of an edited part are compared, too.
             State::Damaged { why } => frame::read_all(&path).map_err(|_| damaged(why)),
             State::There { .. } => frame::read_all(&path).map_err(|error| damaged(error.reason)),
-            State::Foreign { why } if why != OTHER_SWEEP => frame::read_all(&path).map_err(|_| State::Foreign { why }),
+            State::Foreign { why: Foreign::OtherProgram } => {
+                frame::read_all(&path).map_err(|error| damaged(error.reason))
+            }
             State::Missing => {
                 sample.missing += inside.count() as u64;
                 continue;

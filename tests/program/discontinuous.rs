@@ -183,7 +183,7 @@ fn regress_what_is_too_large_is_refused() {
     let unknown = fault(&format!("name = \"test\"\n[axes]\n{key} = 1\n[tables.optimal]\n"), b"");
     assert!(unknown.starts_with("spec.toml:3: axes.vvvv") && unknown.ends_with("vvvv..."), "{unknown}");
     let points = "name = \"test\"\npoints = \"points.csv\"\n[tables.stability]\n";
-    assert!(fault(points, format!("{}\n1", "v".repeat(1 << 24)).as_bytes()).contains("points.csv: unknown axis `vvvv"));
+    assert!(fault(points, format!("{}\n1", "v".repeat(1 << 24)).as_bytes()).ends_with("a name of 16777216 characters"));
     assert!(
         fault(points, format!("a\n1{}", ",".repeat(1 << 24)).as_bytes())
             .ends_with("the number of values is 16777217, that of columns 1")

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::common::{files, run, sweep, write_batch};
-use slipsweep::dataset::{CheckDepth, Folder, State};
+use slipsweep::dataset::{CheckDepth, Folder, Foreign, State};
 use slipsweep::sweep::{Plan, Sweep};
 
 const AXES: &str = "t_f = { linspace = [0.02, 0.049, 30] }\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nalpha_2 = [0.0, 0.1]\n\
@@ -197,7 +197,7 @@ fn foreign_parts_are_left_alone() {
     write_batch(&path, &arrow_array::RecordBatch::try_from_iter([("x", x)]).expect("is a table"));
     for look in [CheckDepth::Footer, CheckDepth::Whole] {
         let state = part_of(&sweep, folder.path(), look);
-        assert_eq!(state, State::Foreign { why: "a Parquet file that slipsweep did not write".to_owned() });
+        assert_eq!(state, State::Foreign { why: Foreign::OtherProgram });
     }
 }
 
@@ -241,7 +241,7 @@ fn regress_what_is_no_file_is_never_waited_for() {
     let path = Folder::new(folder.path(), "test").part("optimal", 0);
     let good = fs::read(&path).expect("is there");
     let stranger = |place: &Path, found: &str| {
-        let expected = State::Foreign { why: found.to_owned() };
+        let expected = State::Foreign { why: Foreign::NotAFile(found.to_owned()) };
         for look in [CheckDepth::Footer, CheckDepth::Whole] {
             assert_eq!(part_of(&sweep, folder.path(), look), expected, "{}", place.display());
         }
@@ -290,5 +290,4 @@ fn regress_what_is_no_file_is_never_waited_for() {
 }
 
 /// The report of `status` on a manifest that is not a file.
-const UNREADABLE: &str = "test/manifest.json: cannot read: a device or a named pipe, not a file\n  help: solve this and run the same command again, which keeps \
-                          finished parts; or write elsewhere with --out DIR\n";
+const UNREADABLE: &str = "test/manifest.json: cannot read: a device or a named pipe, not a file\n  help: solve this and run the same command again\n";

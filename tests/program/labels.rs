@@ -211,3 +211,33 @@ fn lines_are_coloured_by_one_label() {
         assert_eq!(by_material.matches(words).count(), count, "{words}: {by_material}");
     }
 }
+
+/// The reader of Parquet takes a dot in a name as the name of a field of a group.
+#[test]
+fn regress_labels_with_dots_and_spaces_can_be_read() {
+    let folder = tempfile::tempdir().expect("is writable");
+    let cases = CASES.replace("sample_id", "Sample No.");
+    run(&sweep(folder.path(), &cases, &spec()), &folder.path().join("results"), 0);
+    assert_eq!(words(&read(&folder.path().join("results"), "crossover"), "Sample No."), ["g1", "", "g3", "g1"]);
+    let question = "SELECT \"Sample No.\" AS \"its.name\", a FROM crossover WHERE \"Sample No.\" = 'g3'";
+    for arguments in [
+        &["head", "results/test"][..],
+        &["query", "results/test", question, "--out", "answer.parquet"],
+        &["head", "answer.parquet"],
+        &["plot", "results/test", "--table", "optimal", "--where", "Sample No.=g1", "--out", "p.svg"],
+        &["trace", "results/test", "optimal", "--row", "5"],
+    ] {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+        let output = program.current_dir(folder.path()).args(arguments).output().expect("runs");
+        assert!(output.status.success(), "{arguments:?}: {output:?}");
+        if arguments[0] == "trace" {
+            let text = String::from_utf8(output.stdout).expect("is text");
+            assert!(text.contains("row 5 of table optimal of test: \"dry\" granite, g3\n"), "{text}");
+        }
+    }
+    let mut program = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+    let output =
+        program.current_dir(folder.path()).args(["query", "results/test", "SELECT Sample FROM crossover"]).output();
+    let message = String::from_utf8(output.expect("runs").stderr).expect("is text");
+    assert!(message.contains("a name with spaces goes in double quotes: \"Sample No.\""), "{message}");
+}

@@ -63,3 +63,34 @@ fn without_a_terminal_text_is_plain() {
         assert!(!text.is_empty() && control.is_none(), "{arguments:?}: {control:?}");
     }
 }
+
+/// Where it leads to a pipe, such as /dev/stdout, or to nothing, a link stays.
+#[cfg(unix)]
+#[test]
+fn regress_a_link_is_followed_and_never_replaced() {
+    let folder = folder();
+    let question = ["query", "results/test", "SELECT count(*) AS n FROM gap", "--format", "csv", "--out"];
+    for (target, found) in [("/proc/self/fd/1", "n\n10000\n"), ("answer.csv", "")] {
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(target, &link).expect("is writable");
+        let output = through(folder.path(), "\"$@\" | cat", &[&question[..], &["link"]].concat());
+        assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).starts_with(found), "{output:?}");
+        assert_eq!(fs::read_link(&link).expect("is a link").as_os_str(), target);
+        fs::remove_file(&link).expect("is there");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("answer.csv")).expect("is there"), "n\n10000\n");
+}
+
+#[test]
+fn pictures_and_pages_go_to_standard_output() {
+    let folder = folder();
+    for (arguments, start) in [
+        (&["plot", "results/test", "--table", "gap", "--out", "-"][..], "<svg"),
+        (&["report", "results/test", "--out", "-"], "<!doctype html>"),
+    ] {
+        let output = through(folder.path(), "\"$@\"", arguments);
+        assert!(output.status.success() && output.stdout.starts_with(start.as_bytes()), "{arguments:?}");
+    }
+    let output = through(folder.path(), "\"$@\"", &["run", "spec.toml", "--out", "-"]);
+    assert_eq!(output.status.code(), Some(1));
+}

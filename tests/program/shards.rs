@@ -280,3 +280,14 @@ fn regress_more_parts_than_can_be_shared_out_are_refused() {
     }
     assert!(!folder.path().join("results").exists());
 }
+
+#[test]
+fn a_shard_without_parts_says_so() {
+    let folder = tempfile::tempdir().expect("is writable");
+    sweep(folder.path(), "t_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n", "[tables.optimal]\n");
+    let said: Vec<String> = (0..2)
+        .map(|index| text(&slipsweep(folder.path(), &["run", "spec.toml", "--shard", &format!("{index}/2")]).stdout))
+        .collect();
+    let without = said.iter().filter(|text| text.contains("nothing to compute: this shard has no parts\n")).count();
+    assert_eq!(without, 1, "{said:?}");
+}

@@ -300,7 +300,10 @@ impl Arguments {
             return Err(wrong(format!("`{name}` needs {}", flags.join(", "))));
         }
         match given.into_iter().find(|(quantity, _)| !heeded.contains(quantity)) {
-            Some((quantity, _)) => Err(wrong(format!("`{name}` takes no {}", flag(quantity)))),
+            Some((quantity, _)) => {
+                let flag = flag(quantity);
+                Err(wrong(format!("`{name}` takes no {flag}\n  help: remove {flag}")))
+            }
             None => Ok(()),
         }
     }

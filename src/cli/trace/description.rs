@@ -108,8 +108,9 @@ pub(super) fn header(arguments: &Arguments, request: &TraceRequest, path: &Trace
         text.push_str(", without the velocity floor v >= 1");
     }
     text.push('\n');
-    if let Some(Origin { dataset, table, row, .. }) = &request.origin {
-        text.push_str(&format!("  row {row} of table {table} of {dataset}\n"));
+    if let Some(Origin { dataset, table, row, label, .. }) = &request.origin {
+        let label = if label.is_empty() { String::new() } else { format!(": {label}") };
+        text.push_str(&format!("  row {row} of table {table} of {dataset}{label}\n"));
     }
     for (parameter, doc) in parameters(request, path) {
         text.push_str(&format!("  {}: {doc}\n", parameter.words()));
@@ -177,8 +178,9 @@ pub(super) fn facts(
     facts.extend(request.bounded.map(|bounded| ("velocity_bound", bounded.to_string())));
     facts.extend(arguments.points.map(|points| ("points", points.to_string())));
     facts.push(("status", path.status.name().to_owned()));
-    if let Some(Origin { dataset, table, row, .. }) = &request.origin {
+    if let Some(Origin { dataset, table, row, label, .. }) = &request.origin {
         facts.extend([("dataset", dataset.clone()), ("table", table.clone()), ("row", row.to_string())]);
+        facts.extend((!label.is_empty()).then(|| ("label", label.clone())));
     }
     facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }

@@ -47,6 +47,8 @@ struct Origin {
     dataset: String,
     table: String,
     row: u64,
+    /// Its labels, from the file of points.
+    label: String,
     /// Whether the status of the row is infeasible.
     is_infeasible: bool,
 }
@@ -192,7 +194,8 @@ impl Arguments {
             return Failure { code, message: format!("error: no `{}` protocol: {absence}", request.name) };
         };
         let reason = first_line(&absence.text(&request.units));
-        Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}", self.subject) }
+        let help = "choose a row whose status is ok";
+        Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}\n  help: {help}", self.subject) }
     }
 
     /// The protocol, its trace, and the effects of a disturbance if one is requested.
@@ -207,7 +210,8 @@ impl Arguments {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
             if let Some(Origin { table, row, .. }) = request.origin.as_ref().filter(|origin| origin.is_infeasible) {
                 let reason = "its status is infeasible: the response diverges, or its optimum does not exist";
-                return Err(wrong(format!("{}: row {row} of `{table}`: {reason}", self.subject)));
+                let help = "choose a row whose status is ok";
+                return Err(wrong(format!("{}: row {row} of `{table}`: {reason}\n  help: {help}", self.subject)));
             }
             let trace = of(&*path.motion)?;
             return Ok((path, trace, None));

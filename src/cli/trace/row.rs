@@ -11,7 +11,7 @@ use crate::model::{StateLaw, Units};
 use crate::plot::table::{Condition, FilteredTable};
 use crate::protocol::Status;
 use crate::sweep::{Spec, friction, units};
-use crate::table;
+use crate::table::{self, Table};
 use crate::trace::{self, Pathless};
 use crate::verify::scale;
 
@@ -76,7 +76,13 @@ impl Arguments {
             friction,
             rtol: self.rtol.unwrap_or(own),
             units,
-            origin: Some(Origin { dataset: manifest.name.clone(), table: name.to_owned(), row: number, is_infeasible }),
+            origin: Some(Origin {
+                dataset: manifest.name.clone(),
+                table: name.to_owned(),
+                row: number,
+                label: label_of(&written, definition),
+                is_infeasible,
+            }),
         })
     }
 }
@@ -89,6 +95,19 @@ fn axes_of(row: &Row, units: &Units) -> Vec<Named> {
         value.is_finite().then(|| Named::new(name, *value, si_name(units, quantity.unit(Scale::Model))))
     };
     row.iter().filter_map(axis).collect()
+}
+
+/// The labels of a row: its words that are neither an axis nor a column of the table.
+fn label_of(row: &Row, table: Option<&Table>) -> String {
+    let is_known = |name: &str| {
+        let has = |table: &Table| table.columns().iter().any(|column| column.name == name);
+        name == table::STATUS || Quantity::from_name(name).is_some() || table.is_some_and(has)
+    };
+    let word = |(name, cell): &(String, Cell)| match cell {
+        Cell::Word(word) if !is_known(name) => Some(word.clone()),
+        _ => None,
+    };
+    row.iter().filter_map(word).collect::<Vec<_>>().join(", ")
 }
 
 /// Greatest number of rows that a message names. Chosen: they fit on a line.

@@ -290,7 +290,8 @@ impl Compiler<'_> {
         match self.axes.iter().find(|quantity| quantity.name() == name.value) {
             Some(quantity) => Ok((Op::Axis(*quantity), quantity.words())),
             None => {
-                let known: Vec<&str> = self.axes.iter().map(|quantity| quantity.name()).collect();
+                let labels = self.points.iter().flat_map(|points| &points.labels).map(|label| label.name.as_str());
+                let known: Vec<&str> = labels.chain(self.axes.iter().map(|quantity| quantity.name())).collect();
                 Err(Fault::unknown(position(expression), "axis", &name.value, &known))
             }
         }

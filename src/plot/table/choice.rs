@@ -71,7 +71,8 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     }
     let of_at_least = |values: usize| choice.find(defaults.x, colour, values);
     let preferred = || of_at_least(defaults.least_map.min(MANY_VALUES)).or_else(|| of_at_least(3));
-    let preferred = || preferred().or_else(|| choice.longest()).or_else(|| of_at_least(2));
+    let any = || choice.varying.first().map(|axis| axis.name.clone());
+    let preferred = || preferred().or_else(|| choice.longest()).or_else(|| of_at_least(2)).or_else(any);
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
@@ -103,10 +104,11 @@ impl<'a> Choice<'a> {
     ) -> Result<Choice<'a>, PlotError> {
         for (argument, axis) in [("--x", &request.x), ("--y", &request.y)] {
             if let Some(label) = axis.clone().filter(|axis| filtered.is_label(axis)) {
+                let requested = request.y.clone().filter(|y| filtered.has(y) && !filtered.is_label(y));
+                let line = requested.unwrap_or_else(|| defaults.line(filtered));
                 return Err(PlotError::Refused(format!(
-                    "{argument} {label}: a label is no axis\n  expected: a column of numbers\n  help: --y {} draws a line for each {label}; \
-                     --where \"{label}=…\" selects one",
-                    defaults.line(filtered)
+                    "{argument} {label}: a label is no axis\n  expected: a column of numbers\n  help: --y {line} draws a line for each {label}; \
+                     --where \"{label}=…\" selects one"
                 )));
             }
         }
@@ -135,8 +137,12 @@ impl<'a> Choice<'a> {
     }
 
     fn one_row(&self) -> PlotError {
-        let found = format!("the table `{}` has a single matching row, which makes no picture", self.filtered.table);
-        PlotError::Refused(format!("{found}\n  help: `slipsweep head` shows it"))
+        let table = &self.filtered.table;
+        let found = match self.filtered.rows {
+            0 | 1 => format!("the table `{table}` has a single matching row, which makes no picture"),
+            rows => format!("no other axis varies among the {rows} matching rows of the table `{table}`"),
+        };
+        PlotError::Refused(format!("{found}\n  help: `slipsweep head` shows them"))
     }
 
     /// The error if no two axes make a map.

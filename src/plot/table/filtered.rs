@@ -262,17 +262,22 @@ impl FilteredTable {
         Ok(frame::read_where(part, names, &may_hold).map_err(ReadError::from)?)
     }
 
-    /// The label of a row in markup, from the cells of the columns of labels; for empty cells, as in `no material`.
+    /// The label of a group of rows, as [`FilteredTable::label`]; for empty cells, as in `no material`.
+    pub fn label_of_group(&self, cells: &[f64]) -> String {
+        match (self.label(cells), self.labels.first()) {
+            (label, Some((name, _))) if label.is_empty() => format!("no {}", label::literal(name)),
+            (label, _) => label,
+        }
+    }
+
+    /// The label of a row in markup, from the cells of the columns of labels; empty for empty cells.
     pub fn label(&self, cells: &[f64]) -> String {
         let word = |((_, words), cell): (&(String, Vec<String>), &f64)| {
             let word = words.get(*cell as usize).filter(|_| !cell.is_nan())?;
             Some(label::literal(word))
         };
         let words: Vec<String> = self.labels.iter().zip(cells).filter_map(word).collect();
-        match self.labels.first() {
-            Some((name, _)) if words.is_empty() => format!("no {}", label::literal(name)),
-            _ => words.join(", "),
-        }
+        words.join(", ")
     }
 
     /// Drops all labels but `name`, if it is one that varies.

@@ -372,7 +372,7 @@ fn find(
         let (at, cells) = cells.split_at(drawn[0].len());
         let mut values = values.to_vec();
         makes.merge(axes, &mut values);
-        let new = |values: Vec<f64>| FoundGroup { values, label: filtered.label(label), has_value: false };
+        let new = |values: Vec<f64>| FoundGroup { values, label: filtered.label_of_group(label), has_value: false };
         let (group, known) = found.entry(bits(&values)).or_insert_with(|| (new(values), bits(label)));
         if *known != bits(label) {
             group.label.clear();

@@ -42,7 +42,7 @@ pub struct Source {
     folder: Folder,
     bounded: bool,
     /// Whether the computed curves hold, which are those of logarithmic friction.
-    has_overlays: bool,
+    is_logarithmic: bool,
     units: Units,
 }
 
@@ -228,14 +228,23 @@ impl Source {
         let model = spec.as_ref().and_then(|spec| spec.get("model"));
         let bound = model.and_then(|model| model.get("velocity_bound")).and_then(toml::Value::as_bool);
         let friction = model.and_then(|model| model.get("friction")).and_then(toml::Value::as_str);
-        let has_overlays = friction.is_none_or(|friction| friction == Friction::Log.name());
-        Source { manifest, folder, bounded: bound.unwrap_or(true), has_overlays, units }
+        let is_logarithmic = friction.is_none_or(|friction| friction == Friction::Log.name());
+        Source { manifest, folder, bounded: bound.unwrap_or(true), is_logarithmic, units }
     }
 
     /// Names of the tables with a picture.
     pub fn tables(&self) -> Vec<String> {
         let known = |name: &str| TABLE_PICTURES.iter().any(|picture| picture.table == name);
         self.manifest.tables.iter().map(|table| table.name.clone()).filter(|name| known(name)).collect()
+    }
+
+    /// What of the model differs from the default, for a table that depends on it.
+    fn model(&self, table: &str) -> &'static str {
+        match (self.is_logarithmic, self.bounded) {
+            (false, _) => "regularised friction",
+            (true, false) if !["stability", "step_response"].contains(&table) => "no velocity floor",
+            _ => "",
+        }
     }
 
     /// The picture of a table.
@@ -269,7 +278,8 @@ impl Source {
             }
         };
         figure.title = picture.title.to_owned();
-        let same = [fixed(&filtered, &drawn), figure.subtitle].into_iter().filter(|words| !words.is_empty());
+        let model = self.model(table).to_owned();
+        let same = [fixed(&filtered, &drawn), figure.subtitle, model].into_iter().filter(|words| !words.is_empty());
         figure.subtitle = same.collect::<Vec<_>>().join(", ");
         if let Some((drawn, hidden)) = front {
             figure.remarks.push(format!("rows of {drawn} alone; draw those of {hidden} with --x {hidden}"));

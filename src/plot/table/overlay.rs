@@ -119,7 +119,7 @@ const NO_TIME: Wanted = Wanted { cross: false, floor: false, cheapest: false, mi
 pub fn curves(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigure) {
     let mut has_zero_line = false;
     let table = scene.filtered.table.as_str();
-    let known = OVERLAYS.iter().filter(|overlay| overlay.tables.contains(&table) && scene.source.has_overlays);
+    let known = OVERLAYS.iter().filter(|overlay| overlay.tables.contains(&table) && scene.source.is_logarithmic);
     for overlay in known {
         let along = match [plan.x.as_str(), plan.y.as_str()] {
             [x, y] if overlay.along.contains(&x) && y == overlay.other => 0,
@@ -233,7 +233,7 @@ impl MapPoint<'_> {
 /// Marks the durations, or the ceilings, at which the optimum of a line changes.
 pub fn marks(scene: &TableScene<'_>, plan: &lines::LineColumns, lined: &mut LineFigure) {
     let count = lined.groups.shown.len();
-    if scene.filtered.table != "optimal" || count > MAX_MARKED_LINES || !scene.source.has_overlays {
+    if scene.filtered.table != "optimal" || count > MAX_MARKED_LINES || !scene.source.is_logarithmic {
         return;
     }
     // Of coinciding lines, one is drawn.
