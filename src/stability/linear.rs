@@ -109,7 +109,7 @@ pub fn critical_velocity(law: Law, k: f64, m: f64) -> Option<f64> {
 }
 
 /// `k - (b - a)`.
-fn excess_stiffness(law: Law, k: f64) -> f64 {
+pub(super) fn excess_stiffness(law: Law, k: f64) -> f64 {
     let plain = k - (law.b - law.a);
     let cancels = plain.abs() < CANCELLATION * k;
     if cancels { (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high } else { plain }

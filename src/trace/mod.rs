@@ -82,6 +82,14 @@ impl Trace {
         Some(Trace { moments, v_min, v_max })
     }
 
+    /// The moments without those of steady sliding before a jump at the start and after one at the end.
+    pub fn within_jumps(&self) -> &[Moment] {
+        let is_jump = |pair: Option<&[Moment]>| pair.is_some_and(|pair| pair[0].t == pair[1].t);
+        let mut pairs = self.moments.windows(2);
+        let (first, last) = (is_jump(pairs.next()), is_jump(pairs.next_back()));
+        &self.moments[usize::from(first)..self.moments.len() - usize::from(last)]
+    }
+
     /// This trace, and `rest` after it.
     pub fn then(mut self, rest: Trace) -> Trace {
         let start = self.moments.last().map_or(0.0, |last| last.t);

@@ -486,9 +486,7 @@ fn least_cubic(case: &Case, law: StateLaw, bounds: &Bounds, rtol: f64) -> Result
         return Err(Absence::Border);
     }
     let landscape = Landscape::under(law, &case.transition, case.t_f, rtol);
-    let Some(motion) = landscape.motion([value.a_2, value.a_3].map(DoubleDouble::new), Friction::Log) else {
-        return Err(Absence::Border);
-    };
+    let motion = landscape.motion(value.coefficients, Friction::Log).ok_or(Obstacle::NotConverged)?;
     let mut parameters = scaled(value.a_2, value.a_3);
     let doc = match bounds.v_ceiling.is_finite() {
         true => "(W_s - W*)/W*; W* obeys v_ceiling, the shortcut need not",

@@ -81,6 +81,10 @@ pub fn check(row: &mut CheckedRow<'_>) -> Checked {
         if let Some(v) = row.number("v_crit") {
             row.push("v_crit", (critical(v).high / k - 1.0).abs());
             row.push("v_crit", if critical(2.0 * v).high < k { f64::INFINITY } else { 0.0 });
+        } else if m > 0.0 && problem.law.b > problem.law.a && k.is_finite() {
+            // Sliding that is stable somewhere is unstable at high velocities.
+            let is_stable = [problem.v_i, problem.v_f].map(|v| critical(v).high < k);
+            row.judge("v_crit", !is_stable.contains(&true), "a number");
         }
     } else {
         let square = (a * (double(k) / weakening - double(1.0)) / double(m)).high;

@@ -544,3 +544,44 @@ fn ceilings_are_kept_or_named() {
     );
     shown(&[&["optimal", "--v-ceiling", "150", "--t-f", "0.0305665"], &UP[2..]]);
 }
+
+/// On the border, where theta rises as fast as the law allows, rounded coefficients lie outside of the admissible set.
+#[test]
+fn regress_a_best_cubic_on_the_border_has_a_trace() {
+    let text = shown(&[
+        &[
+            "best_cubic",
+            "--law",
+            "slip",
+            "--v-ceiling",
+            "1e11",
+            "--a",
+            "0.00696833478195458",
+            "--b",
+            "0.004695163778909756",
+        ],
+        &["--v-i", "10.319731237181962", "--v-f", "659.3628922320387", "--t-f", "0.6343788610944021"],
+    ]);
+    assert!(text.contains("work = 9.25942615, v_min = 2.56154413") && text.contains("status ok\n"), "{text}");
+}
+
+/// Friction of steady sliding after the protocol is below 0, that on the way is not.
+#[test]
+fn regress_friction_after_the_protocol_does_not_count() {
+    let text = shown(&[
+        &[
+            "gap",
+            "--law",
+            "prz",
+            "--a",
+            "0.066243221839499",
+            "--b",
+            "0.42895778470710894",
+            "--t-f",
+            "0.41516991857292784",
+        ],
+        &["--v-i", "7.996693541709595", "--v-f", "17.057858962737615"],
+        &["--alpha-2", "-0.014090279963449685", "--alpha-3", "0.677576172926355"],
+    ]);
+    assert!(text.contains("status ok\n"), "{text}");
+}

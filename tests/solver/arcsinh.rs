@@ -12,7 +12,7 @@ use slipsweep::trace::{Times, Trace};
 
 use crate::extent::quick_or_long;
 use crate::reference::{self, Row};
-use crate::support::Random;
+use crate::support::{Random, relative};
 
 fn transition(row: &Row) -> Transition {
     let law = Law { a: row.number("a"), b: row.number("b") };
@@ -96,6 +96,44 @@ fn reference_stability() {
             assert_near(row, "v_crit", v_crit, 1e-10);
         }
     }
+}
+
+/// Roots of `k = k_c(v)`, computed with 60 digits: close to the least `k_c`, where a scan missed them, and where `k` is just above `b - a`.
+#[test]
+fn regress_critical_velocities_are_found_to_all_digits() {
+    for (a, b, k, m, v_crit) in [
+        (0.1, 0.3, 0.08183795266523215, 3.8840372918869876e-7, 228.60421817470785),
+        (0.05, 0.2, 0.025047552296244065, 2.1230232193368384e-9, 1543.5819188788155),
+        (0.07060508714795379, 0.08649194090857298, 0.01588686043693309, 1.9846198752313042e-19, 386809.583811517),
+        (0.05227298138692854, 0.07971476769557728, 0.027441833189729738, 5.562216861675018e-13, 400.6888888881906),
+    ] {
+        let found = critical_velocity(Law { a, b }, k, m).expect("exists");
+        assert!(relative(found, v_crit) < 1e-12, "{found} {v_crit}");
+    }
+}
+
+/// Of all velocities of a fine grid, those above the critical one are unstable, and the one just below is stable.
+#[test]
+fn no_greater_velocity_is_critical() {
+    let mut random = Random(7);
+    let (mut found, mut none) = (0, 0);
+    for _ in 0..2000 {
+        let (a, over) = (random.between(1e-2, 0.3), random.between(0.02, 5.0));
+        let (law, v_0) = (Law { a, b: a * (1.0 + over) }, random.between(1.001, 1e8));
+        let m = a / (v_0 * v_0);
+        let k = (law.b - law.a) * random.between(0.05, 20.0);
+        let margin = |v: f64| 1.0 - SteadySliding::new(linearised(law, v), k, m, v).critical_stiffness() / k;
+        let grid = || (-600..900).map(|i| v_0 * (0.02 * f64::from(i)).exp());
+        let v_crit = critical_velocity(law, k, m);
+        assert!(grid().filter(|v| v_crit.is_none_or(|v_crit| *v > v_crit * (1.0 + 1e-9))).all(|v| margin(v) < 1e-12));
+        if let Some(v_crit) = v_crit {
+            found += 1;
+            assert!(margin(v_crit).abs() < 1e-12 && margin(v_crit * (1.0 - 1e-4)) > 0.0, "{law:?} {k} {m} {v_crit}");
+        } else {
+            none += 1;
+        }
+    }
+    assert!(found > 500 && none > 100, "{found} {none}");
 }
 
 /// A problem of the physical domain, and its duration.

@@ -23,7 +23,7 @@ fn reference_best_shortcuts_of_other_laws() {
         let bounds = Bounds::new(true).with_v_ceiling(row.number("v_ceiling"));
         let solved = solve_under(state, &transition, row.number("t_f"), bounds, 1e-10);
         assert_eq!(solved.status, Status::Ok, "{row:?}");
-        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max } = solved.value.expect("has values");
+        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max, .. } = solved.value.expect("has values");
         let size = a_2.abs() + a_3.abs();
         for (name, found, scale, budget) in [
             ("a_2", a_2, size, 2e-8),

@@ -13,8 +13,8 @@ use super::{
 };
 use crate::grid::Quantity;
 use crate::model::{Friction, StateLaw, Units};
-use crate::protocol::Motion;
 use crate::protocol::shortcut::Case;
+use crate::protocol::{Motion, Status};
 use crate::trace::{self, Absence, Disturbed, Protocol, Times, Trace, TracedPath};
 
 pub use arguments::Arguments;
@@ -49,8 +49,8 @@ struct Origin {
     row: u64,
     /// Its labels, from the file of points.
     label: String,
-    /// Whether the status of the row is infeasible.
-    is_infeasible: bool,
+    /// Its status.
+    status: Option<Status>,
 }
 
 /// Traces a protocol.
@@ -128,8 +128,11 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
         None => arguments.request()?,
     };
     let (mut path, trace, effects) = arguments.traced(&request)?;
-    let least = trace.moments.iter().map(|moment| moment.friction).fold(f64::INFINITY, f64::min);
-    path.status = path.status.with_friction(least);
+    // A row states its status, which may depend on an optimum; friction of steady sliding before and after a jump is not that of the protocol.
+    path.status = request.origin.as_ref().and_then(|origin| origin.status).unwrap_or_else(|| {
+        let inner = trace.within_jumps().iter().map(|moment| moment.friction);
+        path.status.with_friction(inner.fold(f64::INFINITY, f64::min))
+    });
     let mut trace = trace.in_units(&request.units);
     // A given duration keeps its digits, which the conversion to and from SI rounds.
     let is_duration = |number: &&Named| number.name == Quantity::Time.name() && request.units != Units::Scaled;
@@ -208,7 +211,9 @@ impl Arguments {
         };
         let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
-            if let Some(Origin { table, row, .. }) = request.origin.as_ref().filter(|origin| origin.is_infeasible) {
+            if let Some(Origin { table, row, .. }) =
+                request.origin.as_ref().filter(|origin| origin.status == Some(Status::Infeasible))
+            {
                 let reason = "its status is infeasible: the response diverges, or its optimum does not exist";
                 let help = "choose a row whose status is ok";
                 return Err(wrong(format!("{}: row {row} of `{table}`: {reason}\n  help: {help}", self.subject)));

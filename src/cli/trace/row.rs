@@ -65,7 +65,7 @@ impl Arguments {
             cell.and_then(|cell| if let Cell::Word(word) = cell { Some(word.as_str()) } else { None })
         };
         let law = word(Quantity::Law.name()).and_then(StateLaw::find);
-        let is_infeasible = word(table::STATUS) == Some(Status::Infeasible.name());
+        let status = Status::ALL.into_iter().find(|status| word(table::STATUS) == Some(status.name()));
         Ok(TraceRequest {
             bounded: trace::has_floor(name, friction).then_some(bounded),
             name: protocol_name,
@@ -81,7 +81,7 @@ impl Arguments {
                 table: name.to_owned(),
                 row: number,
                 label: label_of(&written, definition),
-                is_infeasible,
+                status,
             }),
         })
     }

@@ -18,6 +18,7 @@ use super::cubic::Landscape;
 use super::optimal::Bounds as OptimumBounds;
 use super::{Solved, SolverStats, Status, optimal, relaxed};
 use crate::model::{StateLaw, Transition};
+use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use ellipse::{CutResult, Ellipse, Until};
 use plane::{Bound, Coefficients, Plane};
@@ -29,6 +30,8 @@ pub struct BestCubic {
     pub a_2: f64,
     /// `alpha_3 t_f^2`.
     pub a_3: f64,
+    /// Both with 32 digits: on the border of the admissible set, rounded ones may lie outside.
+    pub coefficients: [DoubleDouble; 2],
     /// Its work `W_s`.
     pub work: f64,
     /// The optimal work `W*`.
@@ -101,9 +104,10 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
     };
     let own = if v_min < 1.0 { Status::BelowBound } else { Status::Ok };
     let status = own.with_friction(path.friction_min(law)).compared_with(optimum.status);
-    let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
+    let coefficients = plane.coefficients(least.place);
+    let [a_2, a_3] = coefficients.map(|a| a.high);
     let (gap, v_max) = (excess / optimum_value.work, landscape.greatest_velocity(&path));
-    let value = BestCubic { a_2, a_3, work, work_optimal: optimum_value.work, gap, v_min, v_max };
+    let value = BestCubic { a_2, a_3, coefficients, work, work_optimal: optimum_value.work, gap, v_min, v_max };
     Solved { status, value: Some(value), stats }
 }
 
@@ -169,7 +173,8 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
     if v_min < 1.0 - TOUCHING_VELOCITY {
         return without(Status::NotConverged, stats);
     }
-    let [a_2, a_3] = plane.coefficients(least.place).map(|a| a.high);
+    let coefficients = plane.coefficients(least.place);
+    let [a_2, a_3] = coefficients.map(|a| a.high);
     let gap = (least.work - work_optimal) / work_optimal;
     if least.active.contains(&Bound::Velocity) {
         // On the border the velocity is 1, or that of the fastest rise of the slip law; it depends on the root of the rounding of the coefficients.
@@ -178,7 +183,7 @@ fn solve_nonconvex(state: StateLaw, transition: &Transition, t_f: f64, v_ceiling
     }
     let status = Status::Ok.with_friction(friction_min).compared_with(optimum.status);
     let (work, v_max) = (least.work, landscape.greatest_velocity(&path));
-    Solved { status, value: Some(BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max }), stats }
+    Solved { status, value: Some(BestCubic { a_2, a_3, coefficients, work, work_optimal, gap, v_min, v_max }), stats }
 }
 
 /// Distance of the least velocity from 1 that is rounding where the bound is active. Chosen: far above rounding.

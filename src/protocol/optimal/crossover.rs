@@ -146,7 +146,8 @@ fn deceleration(quadratures: &mut Quadratures, wanted: Wanted, times: &mut Cross
         let t_min = problem.t_min();
         times.t_min = Some(t_min);
         times.work_at_t_min = Some(floor::work(&problem.law, problem.from, t_min));
-        quadratures.meet(1.0 + b * problem.from.ln, || false);
+        // No other protocol is as fast.
+        quadratures.meet(1.0 + b * problem.from.ln, || true);
     }
     let turns = problem.friction_end() > b - a;
     if wanted.turn && turns {

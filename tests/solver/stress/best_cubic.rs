@@ -38,7 +38,7 @@ fn every_best_shortcut_is_the_best_or_states_so() {
         let solved = solve(transition, t_f, bounded, rtol);
         row.status(solved.status);
         let Some(best) = solved.value else { return };
-        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max } = best;
+        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max, .. } = best;
         let numbers = [a_2, a_3, work, work_optimal, gap, v_min, v_max];
         row.fact("finite", numbers.iter().all(|number| number.is_finite()));
         // Where friction is that low, the extremal that the gap compares with need not be the least.

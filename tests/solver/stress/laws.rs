@@ -169,7 +169,7 @@ fn every_best_shortcut_of_other_laws_is_the_best_or_states_so() {
         let solved = solve_under(state, transition, t_f, Bounds::new(true).with_v_ceiling(v_ceiling), rtol);
         row.status(solved.status);
         let (Status::Ok, Some(best)) = (solved.status, solved.value) else { return };
-        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max } = best;
+        let BestCubic { a_2, a_3, work, work_optimal, gap, v_min, v_max, .. } = best;
         let numbers = [a_2, a_3, work, work_optimal, gap, v_min, v_max];
         row.fact("finite", numbers.iter().all(|number| number.is_finite()));
         row.fact("the bound is kept", v_min >= 1.0);
