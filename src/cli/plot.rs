@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Table to draw [default: every table, one picture each]
     #[arg(long, value_name = "NAME")]
     table: Option<String>,
-    /// Rows to show, such as "a=0.03, v_f>=10"
+    /// Rows to show: comparisons by =, !=, <, <=, >, >= or in (…), joined by commas, such as "a=0.03, v_f>=10"
     #[arg(long = "where", value_name = "CONDITION")]
     conditions: Vec<String>,
     /// Horizontal axis; for traces a column, such as v [default for traces: t]

@@ -125,9 +125,9 @@ impl Sweep {
         match Spec::recovered(text) {
             Ok(spec) => Sweep::check(&spec, text, folder),
             Err((faults, spec)) => {
-                // Without an axis, others may depend on it.
-                let spec =
-                    spec.filter(|_| !iter::once(&faults).chain(&faults.others).any(|fault| fault.key.contains("axes")));
+                // Without an axis or a scale, other faults may follow.
+                let is_needed = |fault: &SpecError| fault.key.contains("axes") || fault.key.starts_with("model");
+                let spec = spec.filter(|_| !iter::once(&faults).chain(&faults.others).any(is_needed));
                 let others = spec.and_then(|spec| independent(&spec, folder).err());
                 Err(match others {
                     Some(others) => SpecError::and(Some(faults), others.located(text)),

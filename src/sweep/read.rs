@@ -100,8 +100,10 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let fault = unknown(key, "key", names[0], &names[1..]);
         let home = SECTIONS.iter().find(|(_, keys)| keys.contains(&names[0])).map(|(section, _)| *section);
-        let home = Quantity::from_name(names[0]).map(|_| "the line [axes], or [block.axes] in a block").or(home);
         return match home {
+            _ if Quantity::from_name(names[0]).is_some() => {
+                SpecError { help: "axes go below the line [axes], or [block.axes] in a block".into(), ..fault }
+            }
             _ if fault.key.contains("axes.") && !fault.help.starts_with("did you mean") => {
                 SpecError { help: HELP_FOR_FORM.into(), ..fault }
             }

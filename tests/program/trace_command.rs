@@ -562,7 +562,7 @@ fn regress_a_best_cubic_on_the_border_has_a_trace() {
         ],
         &["--v-i", "10.319731237181962", "--v-f", "659.3628922320387", "--t-f", "0.6343788610944021"],
     ]);
-    assert!(text.contains("work = 9.25942615, v_min = 2.56154413") && text.contains("status ok\n"), "{text}");
+    assert!(text.contains("work = 9.25942615, v_min = 2.561544") && text.contains("status ok\n"), "{text}");
 }
 
 /// Friction of steady sliding after the protocol is below 0, that on the way is not.
