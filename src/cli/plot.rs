@@ -186,7 +186,7 @@ impl Arguments {
         }
     }
 
-    /// Writes a figure, and says where; the line begins with `name`.
+    /// Writes a figure, and reports its path; the line begins with `name`.
     fn write(&self, figure: &Figure, name: &str, stem: &str, place: &OutputTarget) -> Result<(), Failure> {
         let path = match place.is_file {
             true => place.path.clone(),

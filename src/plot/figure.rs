@@ -577,7 +577,7 @@ impl Panel {
         (is_inside(self.x.scale.fraction(x)) && is_inside(self.y.scale.fraction(y))).then(|| self.place(area, (x, y)))
     }
 
-    /// Draws the name of each row once, beside one of its marks, where it meets neither a mark nor another name; a name without space is left out.
+    /// Draws the name of each row once, near one of its marks, where it meets neither a mark nor another name; a name without space is left out.
     fn draw_names(&self, canvas: &mut Canvas, area: Area) {
         let around = |(x, y): (f64, f64)| Area { x: x - 2.0, y: y - 2.0, width: 4.0, height: 4.0 };
         let marks =
@@ -589,9 +589,9 @@ impl Panel {
         for (at, name) in names.flatten() {
             let Some((x, y)) = self.inside(area, *at).filter(|_| !drawn.contains(&name.as_str())) else { continue };
             let wide = NOTE_SIZE * label::width(name);
-            let beside =
+            let around_mark =
                 [(x + 3.5, y), (x - 3.5 - wide, y), (x - 0.5 * wide, y - NOTE_SIZE), (x - 0.5 * wide, y + NOTE_SIZE)];
-            let boxes = beside.map(|(x, y)| Area { x, y: y - 0.5 * NOTE_SIZE, width: wide, height: NOTE_SIZE });
+            let boxes = around_mark.map(|(x, y)| Area { x, y: y - 0.5 * NOTE_SIZE, width: wide, height: NOTE_SIZE });
             let is_free = |place: &&Area| {
                 let is_within = place.x >= area.x && place.x + wide <= area.x + area.width && place.y >= area.y;
                 is_within

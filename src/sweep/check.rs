@@ -124,7 +124,8 @@ impl Sweep {
     pub fn parse(text: &str, folder: &Path) -> Result<Sweep, SpecError> {
         match Spec::recovered(text) {
             Ok(spec) => Sweep::check(&spec, text, folder),
-            Err((faults, spec)) => {
+            Err(faulty) => {
+                let (faults, spec) = *faulty;
                 // Without an axis or a scale, other faults may follow.
                 let is_needed = |fault: &SpecError| fault.key.contains("axes") || fault.key.starts_with("model");
                 let spec = spec.filter(|_| !iter::once(&faults).chain(&faults.others).any(is_needed));

@@ -16,25 +16,25 @@ impl Spec {
     ///
     /// The syntax error, or unknown and missing keys and values of the wrong type.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
-        Spec::recovered(text).map_err(|(faults, _)| faults)
+        Spec::recovered(text).map_err(|faulty| faulty.0)
     }
 
     /// Reads a spec from TOML; with the faults of keys and types, the spec without these keys if it is complete.
-    pub(super) fn recovered(text: &str) -> Result<Spec, (SpecError, Option<Spec>)> {
+    pub(super) fn recovered(text: &str) -> Result<Spec, Box<(SpecError, Option<Spec>)>> {
         let document = DeTable::parse(text).map_err(|error| {
             let help = "put text and expressions in \"quotes\", close brackets, write decimals with a point, commas between values, and each key once";
             let fault =
                 SpecError::new("", format!("not TOML: {}", error.message()), "key = value, [table] or # comment", help);
-            (SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }, None)
+            Box::new((SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }, None))
         })?;
         let document = document.into_inner();
         let (mut rest, mut known) = (text.to_owned(), None);
         loop {
             let error: toml::de::Error = match (toml::from_str(&rest), known) {
                 (Ok(spec), None) => return Ok(spec),
-                (Ok(spec), Some(faults)) => return Err((faults, Some(spec))),
+                (Ok(spec), Some(faults)) => return Err(Box::new((faults, Some(spec)))),
                 // Its entry may be the blank one.
-                (Err(error), Some(faults)) if is_missing(&error) => return Err((faults, None)),
+                (Err(error), Some(faults)) if is_missing(&error) => return Err(Box::new((faults, None))),
                 (Err(error), faults) => {
                     known = faults;
                     error
@@ -48,7 +48,7 @@ impl Spec {
             let faults = SpecError::and(known, fault);
             // Without the entry other faults show, at the same places.
             if !entry.is_some_and(|entry| blank(&mut rest, entry)) || faults.others.len() + 1 == MAX_FAULTS {
-                return Err((faults, None));
+                return Err(Box::new((faults, None)));
             }
             known = Some(faults);
         }

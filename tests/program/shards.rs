@@ -282,7 +282,7 @@ fn regress_more_parts_than_can_be_shared_out_are_refused() {
 }
 
 #[test]
-fn a_shard_without_parts_says_so() {
+fn a_shard_without_parts_states_it() {
     let folder = tempfile::tempdir().expect("is writable");
     sweep(folder.path(), "t_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\n", "[tables.optimal]\n");
     let said: Vec<String> = (0..2)
