@@ -12,9 +12,6 @@ use crate::sweep::path_hint;
 /// Greatest number of datasets that a message lists. Chosen: they fit on a line.
 const MAX_NAMED_DATASETS: usize = 4;
 
-/// The help where a dataset is expected.
-const HELP_FOR_DATASET: &str = "name a folder that `slipsweep run` wrote";
-
 /// The kind of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -95,10 +92,8 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
         Kind::Dataset => ("a dataset".to_owned(), format!("`slipsweep summary {shown}` shows its contents")),
         Kind::Spec => ("a spec".to_owned(), format!("`slipsweep run {shown}` computes its dataset; name that folder")),
         Kind::Trace => ("a trace".to_owned(), format!("`slipsweep plot {shown}` draws it")),
-        Kind::Other => other(path),
+        Kind::Other => other(path, kinds),
     };
-    let wants_spec = kinds == [Kind::Spec] && help == HELP_FOR_DATASET;
-    let help = if wants_spec { "name a spec; `slipsweep init NAME` writes one".to_owned() } else { help };
     let expected: Vec<&str> = kinds.iter().map(|kind| kind.words()).collect();
     refused(format!("{shown}: {found}"), expected.join(", or "), help)
 }
@@ -111,14 +106,18 @@ fn datasets_in(folder: &Path) -> Vec<PathBuf> {
     datasets
 }
 
-/// A path of another kind in words, and the help for it.
-fn other(path: &Path) -> (String, String) {
+/// A path of another kind in words, and the help for it where `kinds` are expected.
+fn other(path: &Path, kinds: &[Kind]) -> (String, String) {
     let shown = path.display();
     if let Some(dataset) = path.ancestors().skip(1).take(2).find(|above| above.join(MANIFEST).is_file()) {
         let dataset = if dataset == Path::new("") { Path::new(".") } else { dataset };
         return ("a piece of a dataset".to_owned(), format!("name the dataset, {}", dataset.display()));
     }
-    let help = HELP_FOR_DATASET.to_owned();
+    let help = match kinds {
+        [Kind::Spec] => "name a spec; `slipsweep init NAME` writes one",
+        _ => "name a folder that `slipsweep run` wrote",
+    };
+    let help = help.to_owned();
     if path.is_dir() {
         let names: Vec<String> =
             datasets_in(path).iter().take(MAX_NAMED_DATASETS).map(|path| path.display().to_string()).collect();

@@ -19,6 +19,7 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
+use indexmap::IndexSet;
 use polars::prelude::{IntoLazy, LazyFrame, PolarsError, PolarsResult, Schema, SortMultipleOptions};
 use polars::sql::SQLContext;
 
@@ -227,15 +228,14 @@ impl Tables {
         let named: HashSet<&str> = sql.split(|letter: char| !(letter.is_alphanumeric() || letter == '_')).collect();
         let read = self.sources.iter().filter(|source| checked.read.contains(&source.name));
         let schemas = read.filter_map(|source| source.frame.clone().collect_schema().ok());
-        let mut words: Vec<String> = schemas
+        let words: IndexSet<String> = schemas
             .flat_map(|schema| {
                 let words = schema.iter().filter(|(_, kind)| kind.is_categorical() || kind.is_string());
                 words.map(|(name, _)| name.to_string()).collect::<Vec<_>>()
             })
             .filter(|name| named.contains(name.as_str()))
             .collect();
-        words.dedup();
-        words
+        words.into_iter().collect()
     }
 
     /// The fault of a query.
@@ -283,11 +283,10 @@ impl Tables {
         } else if known("dtype") || known("supertype") || known("cannot compare") || known("cannot cast") {
             let help = "words can be compared and counted; arithmetic, sum and avg need numbers; CAST('inf' AS DOUBLE) is infinity";
             let words = self.words(sql, checked);
-            let found = match words.as_slice() {
-                [] => "words in place of numbers, or numbers in place of words".to_owned(),
-                [column] => format!("`{column}` is a column of words, and is used as one of numbers"),
-                _ => format!("words and numbers are mixed; columns of words: `{}`", words.join("`, `")),
-            };
+            let mut found = "words in place of numbers, or numbers in place of words".to_owned();
+            if !words.is_empty() {
+                found.push_str(&format!("; columns of words: {}", words.join(", ")));
+            }
             (found, help.to_owned())
         } else {
             (line.to_owned(), "correct the query".to_owned())

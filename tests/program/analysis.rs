@@ -327,18 +327,16 @@ fn wrong_questions_are_answered_with_the_known_names() {
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
     }
     // Types that do not fit may show only while the rows are read.
-    let status = "`status` is a column of words, and is used as one of numbers";
-    for (question, found) in [
-        ("SELECT * FROM best_cubic WHERE gap = 'x'", "words in place of numbers, or numbers in place of words"),
+    let status = "; columns of words: status";
+    for (question, words) in [
+        ("SELECT * FROM best_cubic WHERE gap = 'x'", ""),
         ("SELECT sum(status) FROM best_cubic", status),
         ("SELECT gap FROM best_cubic WHERE status = 1", status),
         ("SELECT sqrt(status) FROM best_cubic", status),
         ("SELECT avg(status) FROM best_cubic", status),
-        (
-            "SELECT t_f + strategy FROM optimal WHERE status = 'ok'",
-            "words and numbers are mixed; columns of words: `strategy`, `status`",
-        ),
+        ("SELECT t_f + strategy FROM optimal WHERE status = 'ok'", "; columns of words: strategy, status"),
     ] {
+        let found = format!("words in place of numbers, or numbers in place of words{words}");
         let expected = (1, format!("error: {found}\n  help: {types}\n"));
         assert_eq!(refused(folder.path(), &["query", "results/test", question]), expected, "{question}");
         assert_eq!(refused(folder.path(), &["query", "results/test", question, "--out", "none.csv"]), expected);
