@@ -129,11 +129,12 @@ impl Source {
     /// The table in a CSV file. A column is numeric if all its cells are numbers; lines that begin with # are comments.
     fn csv(path: &Path) -> Result<Source, QueryError> {
         let failed = |source| QueryError::Read { path: path.display().to_string(), source };
-        let frame = csv(path).map_err(failed)?;
+        let (frame, units) = csv(path).map_err(failed)?;
         let columns: Vec<String> = frame.get_column_names_owned().iter().map(ToString::to_string).collect();
+        let units = units.filter(|units| units.len() == columns.len());
         Ok(Source {
             name: name_of(path),
-            units: vec![String::new(); columns.len()],
+            units: units.unwrap_or_else(|| vec![String::new(); columns.len()]),
             columns,
             paths: vec![path.to_owned()],
             missing: 0,
@@ -155,7 +156,8 @@ impl Source {
     }
 }
 
-fn csv(path: &Path) -> PolarsResult<DataFrame> {
+/// The rows of a CSV file, and the units of its columns if a comment of `slipsweep trace` states them.
+fn csv(path: &Path) -> PolarsResult<(DataFrame, Option<Vec<String>>)> {
     let bytes = fs::read(path)?;
     let mut opened = None;
     for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
@@ -173,7 +175,10 @@ fn csv(path: &Path) -> PolarsResult<DataFrame> {
     }
     let format = CsvParseOptions::default().with_comment_prefix(Some("#"));
     let options = CsvReadOptions::default().with_infer_schema_length(None).with_parse_options(format);
-    CsvReader::new(Cursor::new(bytes)).with_options(options).finish()
+    let comments = bytes.split(|&byte| byte == b'\n').take_while(|line| line.starts_with(b"#"));
+    let units = comments.into_iter().find_map(|line| line.strip_prefix(b"# units = "));
+    let units = units.map(|units| String::from_utf8_lossy(units).trim_end().split(", ").map(str::to_owned).collect());
+    Ok((CsvReader::new(Cursor::new(&bytes)).with_options(options).finish()?, units))
 }
 
 /// The folder that a folder is in.

@@ -2,7 +2,7 @@
 //! and the velocities of the row; the gap is that to the traced optimum.
 
 use super::checked_row::NEGATIVE;
-use super::motion::{Followed, lowest};
+use super::motion::Followed;
 use super::open_loop::{self, ControlledProtocol};
 use super::task::{Task, min_duration};
 use super::{Checked, CheckedRow, relaxed};
@@ -104,7 +104,12 @@ impl Cubic {
         };
         let [_, c_1, c_2, c_3] = self.theta;
         let rate = |x: f64| (c_1 + x * (2.0 * c_2 + 3.0 * c_3 * x)) / self.t_f;
-        lowest(&|x| self.theta(x).min(bound - rate(x)), (0.0, 1.0))
+        // Ends, the place of the greatest rate, and those where theta turns.
+        let root = (c_2 * c_2 - 3.0 * c_1 * c_3).sqrt();
+        let sum = -(c_2 + root.copysign(c_2));
+        let places = [0.0, 1.0, -c_2 / (3.0 * c_3), sum / (3.0 * c_3), c_1 / sum];
+        let inside = places.into_iter().filter(|x| (0.0..=1.0).contains(x));
+        inside.map(|x| self.theta(x).min(bound - rate(x))).fold(f64::INFINITY, f64::min)
     }
 
     /// Rounding of the least velocity, relative to the greatest.

@@ -585,3 +585,16 @@ fn regress_friction_after_the_protocol_does_not_count() {
     ]);
     assert!(text.contains("status ok\n"), "{text}");
 }
+
+/// The comments of a CSV have the units.
+#[test]
+fn head_and_query_show_the_units_of_a_trace_in_csv() {
+    let folder = tempfile::tempdir().expect("is writable");
+    assert!(trace(folder.path(), &[&["optimal"], UP, &["--out", "t.csv"]]).status.success());
+    for arguments in [&["head", "t.csv", "-n", "1"][..], &["query", "t.csv", "SELECT tau, v AS speed FROM t LIMIT 1"]] {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_slipsweep"));
+        let output = program.current_dir(folder.path()).args(arguments).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && text.contains("mu_0 sigma") && text.contains("v_0"), "{text}{output:?}");
+    }
+}
