@@ -15,6 +15,7 @@ use crate::grid::Quantity;
 use crate::model::{Friction, StateLaw, Units};
 use crate::protocol::shortcut::Case;
 use crate::protocol::{Motion, Status};
+use crate::sweep::AccuracySpec;
 use crate::trace::{self, Absence, Disturbed, Protocol, Times, Trace, TracedPath};
 
 pub use arguments::Arguments;
@@ -149,9 +150,6 @@ fn solved(arguments: &Arguments) -> Result<Traced, Failure> {
     Ok(Traced { header, trace, units: request.units, facts })
 }
 
-/// Relative accuracy without a row of a table: the default of a spec.
-const DEFAULT_RTOL: f64 = 1e-10;
-
 impl Arguments {
     /// The protocol that the arguments name.
     fn request(&self) -> Result<TraceRequest, Failure> {
@@ -184,7 +182,7 @@ impl Arguments {
             law: self.law,
             friction,
             bounded: trace::has_floor(name, friction).then_some(!self.unbounded),
-            rtol: self.rtol.unwrap_or(DEFAULT_RTOL),
+            rtol: self.rtol.unwrap_or(AccuracySpec::default().rtol),
             units: Units::Scaled,
             origin: None,
         })
