@@ -4,7 +4,7 @@ use super::canvas::{Anchor, Area, Canvas, MILLIMETRE, Stroke, Text};
 use super::colour::{hex, viridis};
 use super::label;
 use super::scale::{Scale, Tick, Ticks};
-use super::symbol::{self, STAR_RADIUS, Symbol};
+use super::symbol::{self, RADIUS, STAR_RADIUS, Symbol};
 
 /// Height of letters, in points. Chosen: as in the captions of journals, readable in print.
 const SIZE: f64 = 7.5;
@@ -579,7 +579,8 @@ impl Panel {
 
     /// Draws the name of each row once, near one of its marks, where it meets neither a mark nor another name; a name without space is left out.
     fn draw_names(&self, canvas: &mut Canvas, area: Area) {
-        let around = |(x, y): (f64, f64)| Area { x: x - 2.0, y: y - 2.0, width: 4.0, height: 4.0 };
+        let size = 2.0 * RADIUS;
+        let around = |(x, y): (f64, f64)| Area { x: x - RADIUS, y: y - RADIUS, width: size, height: size };
         let marks =
             self.layers.iter().filter_map(|layer| if let Layer::Marks(marks) = layer { Some(marks) } else { None });
         let mut taken: Vec<Area> = marks.flatten().filter_map(|(at, _)| self.inside(area, *at)).map(around).collect();

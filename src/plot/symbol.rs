@@ -6,7 +6,7 @@ use super::canvas::{Canvas, Stroke};
 use super::colour::{self, hex};
 
 /// Radius of a symbol, in points. Chosen: twice the width of a curve on each side of it.
-const RADIUS: f64 = 2.0;
+pub const RADIUS: f64 = 2.0;
 
 /// Outer radius of a star, in points. Chosen: it stands out among symbols.
 pub const STAR_RADIUS: f64 = 4.6;
