@@ -142,7 +142,7 @@ impl<'a> Choice<'a> {
             0 | 1 => format!("the table `{table}` has a single matching row, which makes no picture"),
             rows => format!("no other axis varies among the {rows} matching rows of the table `{table}`"),
         };
-        PlotError::Refused(format!("{found}\n  help: `slipsweep head` shows them"))
+        PlotError::Refused(format!("{found}\n  help: `slipsweep head` shows the rows"))
     }
 
     /// The error if no two axes make a map.
