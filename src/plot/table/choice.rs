@@ -5,6 +5,7 @@ use super::lines;
 use super::map;
 use super::{Request, TablePicture};
 use crate::plot::PlotError;
+use crate::plot::colour::MAX_SERIES;
 
 /// A map or lines.
 #[derive(Debug, Clone)]
@@ -76,12 +77,17 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
+    if let Some(colour) = request.colour.as_deref().filter(|_| filtered.is_of_point(&x))
+        && choice.has_symbols(&x, colour, y.first())?
+    {
+        return Ok(Shape::Lines(lines::LineColumns { x, y, series: Some(colour.to_owned()), has_symbols: true }));
+    }
     // A label stands for the axes of its points.
     let of_label = request.colour.as_deref().filter(|colour| filtered.is_label(colour));
     let of_label = of_label.and_then(|_| choice.varying.iter().find(|axis| filtered.is_of_point(&axis.name)));
     let colour = colour.or(of_label.map(|axis| axis.name.as_str()).filter(|name| *name != x));
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
-    Ok(Shape::Lines(lines::LineColumns { x, y, series }))
+    Ok(Shape::Lines(lines::LineColumns { x, y, series, has_symbols: false }))
 }
 
 /// Number of values of an axis that is preferred for lines. Chosen: enough for a curve.
@@ -134,6 +140,26 @@ impl<'a> Choice<'a> {
     fn longest(&self) -> Option<String> {
         let long = self.varying.iter().filter(|axis| axis.words.is_empty());
         Some(long.max_by_key(|axis| axis.values.len())?.name.clone())
+    }
+
+    /// Whether dots over `x` have symbols for the values of `colour`: a label of few words, else each dot has its name, or another axis of the points.
+    fn has_symbols(&self, x: &str, colour: &str, y: Option<&String>) -> Result<bool, PlotError> {
+        let filtered = self.filtered;
+        if filtered.is_label(colour) {
+            return Ok((2..=MAX_SERIES).contains(&filtered.words(colour).len()));
+        }
+        let Some(axis) = filtered.axis(colour).filter(|axis| filtered.is_of_point(&axis.name) && colour != x) else {
+            return Ok(false);
+        };
+        if axis.values.len() <= MAX_SERIES {
+            return Ok(true);
+        }
+        let y = y.map_or("COLUMN", String::as_str);
+        Err(PlotError::Refused(format!(
+            "--color {colour}: an axis of {} values\n  expected: at most {MAX_SERIES}, each with a symbol\n  help: --x {x} --y {colour} --color {y} \
+             draws a map",
+            axis.values.len()
+        )))
     }
 
     fn one_row(&self) -> PlotError {

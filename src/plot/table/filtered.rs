@@ -264,20 +264,35 @@ impl FilteredTable {
 
     /// The label of a group of rows, as [`FilteredTable::label`]; for empty cells, as in `no material`.
     pub fn label_of_group(&self, cells: &[f64]) -> String {
-        match (self.label(cells), self.labels.first()) {
+        match (self.label(&self.label_columns(), cells), self.labels.first()) {
             (label, Some((name, _))) if label.is_empty() => format!("no {}", label::literal(name)),
             (label, _) => label,
         }
     }
 
-    /// The label of a row in markup, from the cells of the columns of labels; empty for empty cells.
-    pub fn label(&self, cells: &[f64]) -> String {
-        let word = |((_, words), cell): (&(String, Vec<String>), &f64)| {
-            let word = words.get(*cell as usize).filter(|_| !cell.is_nan())?;
-            Some(label::literal(word))
-        };
-        let words: Vec<String> = self.labels.iter().zip(cells).filter_map(word).collect();
+    /// The words of the labels `names` in markup, from the cells of a row; empty for empty cells.
+    pub fn label(&self, names: &[&str], cells: &[f64]) -> String {
+        let words: Vec<String> = names.iter().zip(cells).filter_map(|(name, cell)| self.word_of(name, *cell)).collect();
         words.join(", ")
+    }
+
+    /// The word of a label in markup, from its cell.
+    pub fn word_of(&self, label: &str, cell: f64) -> Option<String> {
+        let (_, words) = self.labels.iter().find(|(name, _)| name == label)?;
+        Some(label::literal(words.get(cell as usize).filter(|_| !cell.is_nan())?))
+    }
+
+    /// The labels that name a dot: one that determines all others, if there is one; without the label in the legend.
+    pub fn names_of_dots(&self, legend: Option<&str>) -> Result<Vec<&str>, PlotError> {
+        let mut names = self.label_columns();
+        for label in self.label_columns() {
+            if self.determined(&names, &[label])?.iter().all(|is| *is) {
+                names = vec![label];
+                break;
+            }
+        }
+        names.retain(|name| Some(*name) != legend);
+        Ok(names)
     }
 
     /// Drops all labels but `name`, if it is one that varies.

@@ -415,10 +415,17 @@ fn joined(found: &[FoundGroup], of_points: &[usize]) -> Vec<Vec<f64>> {
     joined
 }
 
-/// The values of the axes numbered `of` in markup, without missing ones.
+/// The values of the axes and labels numbered `of` in markup, without missing ones.
 fn in_words(filtered: &FilteredTable, axes: &[impl AsRef<str>], of: &[usize], values: &[f64]) -> Vec<String> {
-    let named = of.iter().filter(|&&axis| !values[axis].is_nan());
-    named.filter_map(|&axis| Some(filtered.axis(axes[axis].as_ref())?.text_of(values[axis]))).collect()
+    let text = |&axis: &usize| {
+        let (name, value) = (axes[axis].as_ref(), values[axis]);
+        filtered
+            .axis(name)
+            .filter(|_| !value.is_nan())
+            .map(|axis| axis.text_of(value))
+            .or_else(|| filtered.word_of(name, value))
+    };
+    of.iter().filter_map(text).collect()
 }
 
 /// The axes that vary between groups.

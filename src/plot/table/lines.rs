@@ -34,8 +34,10 @@ pub struct LineColumns {
     pub x: String,
     /// Columns of the panels, from the top.
     pub y: Vec<String>,
-    /// The axis that distinguishes lines first.
+    /// The axis that distinguishes lines first, or the label that distinguishes dots.
     pub series: Option<String>,
+    /// Whether rows are dots with a symbol for each value of `series`.
+    pub has_symbols: bool,
 }
 
 /// Lines before they are drawn.
@@ -137,14 +139,22 @@ impl Rows {
     /// Reads the rows of a table.
     fn read(filtered: &FilteredTable, plan: &LineColumns) -> Result<Rows, PlotError> {
         let axis = filtered.axis(&plan.x).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing)?;
-        let (mut further, along) = groups::further(filtered, &[&plan.x])?;
+        let series = plan.series.as_deref();
+        let of_symbols = series.filter(|_| plan.has_symbols);
+        let over: Vec<&str> = [&plan.x]
+            .into_iter()
+            .map(String::as_str)
+            .chain(of_symbols.filter(|name| !filtered.is_label(name)))
+            .collect();
+        let (mut further, along) = groups::further(filtered, &over)?;
         let are_scattered = groups::is_scattered(filtered, &plan.x, &further)?;
-        further.sort_by_key(|name| Some(*name) != plan.series.as_deref());
-        let first = further.first().copied().filter(|name| Some(*name) == plan.series.as_deref());
+        further.extend(of_symbols);
+        further.sort_by_key(|name| Some(*name) != series);
+        let first = further.first().copied().filter(|name| Some(*name) == series);
         let drawn: Vec<&str> = plan.y.iter().map(String::as_str).collect();
         let groups = Groups::new(filtered, &further, GroupRole::Lines, first, [&[&plan.x], &drawn])?;
         let is_named = are_scattered && filtered.rows <= MAX_NAMED_ROWS;
-        let labels = if is_named { filtered.label_columns() } else { Vec::new() };
+        let labels = if is_named { filtered.names_of_dots(of_symbols)? } else { Vec::new() };
         let cells = AxisCells::new(axis, MAX_POSITIONS);
         let has_row_each = are_scattered && filtered.rows <= MAX_POSITIONS as u64;
         let positions = if has_row_each { Vec::new() } else { cells.middles.clone() };
@@ -152,17 +162,17 @@ impl Rows {
         let line = |_| Line { positions: positions.clone(), ranges: ranges.clone(), names: Vec::new() };
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
         let columns = [&plan.x].into_iter().chain(&plan.y).chain(&groups.axes).map(String::as_str);
-        let columns: Vec<&str> = columns.chain(labels).collect();
+        let columns: Vec<&str> = columns.chain(labels.iter().copied()).collect();
         filtered.each(&columns, |row| {
             let (values, rest) = row[1..].split_at(plan.y.len());
-            let (group, labels) = rest.split_at(groups.axes.len());
+            let (group, named) = rest.split_at(groups.axes.len());
             let (Some(group), Some(mut place)) = (groups.place(group), cells.place(row[0])) else { return };
             let line = &mut lines[group];
             if has_row_each {
                 place = line.positions.len();
                 line.positions.push(row[0]);
                 line.ranges.iter_mut().for_each(|ranges| ranges.push((f64::NAN, f64::NAN)));
-                line.names.extend(is_named.then(|| filtered.label(labels)));
+                line.names.extend(is_named.then(|| filtered.label(&labels, named)));
             }
             for (ranges, &value) in line.ranges.iter_mut().zip(values) {
                 let (low, high) = ranges[place];

@@ -182,12 +182,12 @@ impl Raster {
             |_| PanelCells { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
         let mut sheets: Vec<PanelCells> = groups.shown.iter().map(empty).collect();
         let is_named = self.are_dots && filtered.rows <= MAX_NAMED_ROWS;
-        let labels = if is_named { filtered.label_columns() } else { Vec::new() };
+        let labels = if is_named { filtered.names_of_dots(Some(&plan.value))? } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
         let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
         filtered.each(&wanted, |row| {
             let &[x, y, found, status, ref rest @ ..] = row else { return };
-            let (key, labels) = rest.split_at(axes.len());
+            let (key, named) = rest.split_at(axes.len());
             let (Some(panel), Some(column), Some(line)) =
                 (groups.place(key), self.cells[0].place(x), self.cells[1].place(y))
             else {
@@ -197,7 +197,7 @@ impl Raster {
             let mut cell = line * columns + column;
             if self.are_dots {
                 cell = sheet.dots.len();
-                sheet.dots.push(((x, y), filtered.label(labels)));
+                sheet.dots.push(((x, y), filtered.label(&labels, named)));
                 sheet.value.push(f64::NAN);
                 sheet.status.push(0);
             }

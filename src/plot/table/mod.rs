@@ -267,7 +267,9 @@ impl Source {
             "gap_quantiles" if is_default => reduced::quantiles(&filtered)?,
             _ => {
                 let shape = choice::choose(&filtered, picture, request)?;
-                if let (Shape::Lines(_), Some(label)) = (&shape, &request.colour) {
+                if let (Shape::Lines(plan), Some(label)) = (&shape, &request.colour)
+                    && !plan.has_symbols
+                {
                     filtered.keep_label(label);
                 }
                 let drawn = match &shape {
