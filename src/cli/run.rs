@@ -169,7 +169,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
         let cells = request.table.axes().len() + request.projection.indices().len() + 1;
         rows * cells as f64 * MAX_CELL_BYTES + parts as f64 * (MAX_FOOTER_BYTES + sweep.text.len() as f64)
     });
-    if most.sum::<f64>() < free {
+    if most.sum::<f64>() <= free {
         return Ok(());
     }
     // If the upper bound does not fit, a sample estimates the size.
@@ -177,7 +177,7 @@ fn check_room(sweep: &Sweep, plan: &Plan, shards: &[Vec<Range<u64>>], folder: &F
     let bytes = (estimates.tables.iter().zip(&plan.tables).zip(missing))
         .map(|((estimate, table), missing)| estimate.bytes * missing as f64 / table.parts as f64)
         .sum::<f64>();
-    if bytes < free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
+    if bytes <= free { Ok(()) } else { Err(wrong(too_large(folder.path(), bytes, free))) }
 }
 
 /// The sweep and its folder, from a spec or from a dataset, which contains its spec.

@@ -35,9 +35,6 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
     let again = || audit(path, &manifest, arguments.sample, arguments.seed);
     let audits = waiting("solving the sample again", again).map_err(Failure::failed)?;
     say(&report(&audits))?;
-    if let Some(fault) = audits.iter().find_map(|audit| audit.fault.as_ref()) {
-        return Err(Failure::failed(fault));
-    }
     let errors: usize = audits.iter().map(|audit| audit.errors).sum();
     if errors > 0 {
         let message = format!(
@@ -46,7 +43,7 @@ pub fn verify(arguments: &Arguments) -> Result<(), Failure> {
         );
         return Err(Failure { code: EXIT_NOT_CONVERGED, message });
     }
-    Ok(())
+    audits.iter().find_map(|audit| audit.fault.as_ref()).map_or(Ok(()), |fault| Err(Failure::failed(fault)))
 }
 
 /// Number of columns that are named if none fails. Chosen: a table of the answer fits a line.

@@ -1,7 +1,7 @@
 //! The minimum of a function in an interval, by golden section.
 
 /// Fraction of the interval that a section keeps. Derived: `(sqrt 5 - 1)/2`.
-const FRACTION: f64 = 0.618_033_988_749_894_9;
+pub const FRACTION: f64 = 0.618_033_988_749_894_9;
 
 /// Number of sections. Derived: they shrink an interval by 2e-17, below rounding.
 const SECTIONS: u32 = 80;

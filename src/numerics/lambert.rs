@@ -38,16 +38,6 @@ pub fn near_branches(d: Vector) -> Vector {
     (even + p * odd) / (even_below + p * odd_below)
 }
 
-/// [`above_branch`] in every lane for numbers up to [`NEAR_END`] to 4.4e-4, and of `E ln E` to 2.9e-4; exact to first order in `p` at the branch point.
-#[inline(always)]
-pub fn rough_near_branches(d: Vector) -> Vector {
-    let p = (d + d).map(f64::sqrt);
-    let [a_1, a_2, a_3, b_1, b_2] = ROUGH;
-    let one = Vector::splat(1.0);
-    let above = one + p * (Vector::splat(a_1) + p * (Vector::splat(a_2) + a_3 * p));
-    above / (one + p * (Vector::splat(b_1) + b_2 * p))
-}
-
 /// [`above_branch`] for `d > NEAR_END`, without branches: one step of Halley's and one of Newton's method.
 #[inline(always)]
 pub fn far_branch(d: f64) -> f64 {
@@ -95,10 +85,6 @@ const NEAR_BELOW: [f64; 11] = [
     2.130195301253757e-09,
     4.766991243061628e-13,
 ];
-
-/// Numerator and denominator of the rough `E` in powers of `p` without their constants, 1. Made by `tests/reference/coefficients.py`.
-const ROUGH: [f64; 5] =
-    [1.175949494382602, 0.3425365251158108, 0.01849695473396125, 0.17594949438260205, 0.000939475939344346];
 
 /// Coefficients of `ln E/L` with `L = ln(1 + p)`: `(1 + a_1 L + a_2 L^2)/(1 + b_1 L + b_2 L^2)`. Fitted to `ln E <= 36`, where its error is 1.6e-4.
 const GUESS: [f64; 4] = [0.7074810976002599, 0.15562451660492752, 0.5403412703865909, 0.07870485733359356];

@@ -29,6 +29,12 @@ pub const ROUNDING_RTOL: f64 = 4.0 * f64::EPSILON;
 /// Relative difference that counts as the rounding of a quadrature or of an integration. Chosen: ten thousand roundings.
 pub const LONG_ROUNDING_RTOL: f64 = 1e-12;
 
+/// Tightest accuracy that a solver aims at. Chosen: nine hundred roundings, the noise of a long path.
+pub const TIGHT_RTOL: f64 = 1e-13;
+
+/// Relative change of a place at which a function with an extremum there changes by rounding. Derived: the root of `f64::EPSILON`.
+pub const ROOT_OF_ROUNDING: f64 = 1.5e-8;
+
 /// `-ln` of a factor that rounding hides. Derived: that of the rounding, 37, and a margin of `e^8`.
 pub const NEGLIGIBLE_LN: f64 = 45.0;
 

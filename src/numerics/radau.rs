@@ -59,35 +59,23 @@ impl Radau {
         (coefficient(&self.highest[0]) + coefficient(&self.highest[1])) / (4 * NODES) as f64
     }
 
-    /// The polynomial through `start` at 0 and `f` at the nodes, at `u` (barycentric formula).
-    pub fn interpolate(&self, start: f64, f: &Nodes, u: f64) -> f64 {
-        if u == 0.0 {
-            return start;
-        }
+    /// The polynomial through `f` at the nodes, and through `start` at 0 if there is one, at `u` (barycentric formula).
+    pub fn interpolate(&self, start: Option<f64>, f: &Nodes, u: f64) -> f64 {
         let (mut above, mut below) = (0.0, 0.0);
-        for ((&node, &value), &weight) in self.u.iter().zip(f).zip(&self.barycentric) {
-            let distance = u - node;
-            if distance == 0.0 {
-                return value;
+        if let Some(start) = start {
+            if u == 0.0 {
+                return start;
             }
-            let fraction = weight / distance;
-            above += fraction * value;
-            below += fraction;
+            below = self.barycentric[NODES] / u;
+            above = below * start;
         }
-        let fraction = self.barycentric[NODES] / u;
-        (above + fraction * start) / (below + fraction)
-    }
-
-    /// The polynomial through `f` at the nodes, without a value at 0, at `u`.
-    pub fn follow(&self, f: &Nodes, u: f64) -> f64 {
-        let (mut above, mut below) = (0.0, 0.0);
         for ((&node, &value), &weight) in self.u.iter().zip(f).zip(&self.barycentric) {
             let distance = u - node;
             if distance == 0.0 {
                 return value;
             }
             // The weights include the node 0.
-            let fraction = weight * node / distance;
+            let fraction = if start.is_some() { weight / distance } else { weight * node / distance };
             above += fraction * value;
             below += fraction;
         }

@@ -4,6 +4,7 @@
 //! derivative is analytic.
 
 use crate::model::Law;
+use crate::numerics::ROOT_OF_ROUNDING;
 use crate::numerics::elementary::ln;
 use crate::numerics::root::crossing;
 
@@ -78,12 +79,19 @@ pub(super) enum Tolerance {
     OfRange(f64),
 }
 
+impl Tolerance {
+    /// What slopes are multiplied with to be those of a value.
+    fn unit(self, value: f64) -> f64 {
+        if matches!(self, Tolerance::OfValue(_)) { value } else { 1.0 }
+    }
+}
+
+/// Ratio of the slopes of two nodes below which the smaller one counts as vanishing. Chosen: at the end of a shortcut on a spring a maximum and a minimum may
+/// hide between slopes that differ by this.
+const FLAT_RATIO: f64 = 1e-3;
+
 /// A place, with value and slope there.
 type Node = (f64, [f64; 2]);
-
-/// Distance from a node of vanishing slope, in units of a panel, within which a value changes by rounding alone. Derived: the root of the
-/// distance of adjacent doubles at 1.
-const FLAT_LENGTH: f64 = 1.5e-8;
 
 impl ValueRange {
     /// The empty range.
@@ -97,26 +105,32 @@ impl ValueRange {
 
     /// Extends the range to the values between two nodes; `at(u)` returns value and slope.
     ///
-    /// A slope of the control velocity or of friction that vanishes at a node, as at both ends of a protocol, has no sign, and an extremum may be
-    /// arbitrarily near: the interval is divided ever closer to that node.
+    /// A slope that vanishes at a node, as nearly at both ends of a protocol, has no sign, and an extremum may be arbitrarily near: the interval is divided
+    /// ever closer to that node.
     pub fn add_interval(&mut self, first: Node, last: Node, tolerance: Tolerance, at: &impl Fn(f64) -> [f64; 2]) {
         self.add(first.1[0]);
         self.add(last.1[0]);
         let allowed = self.allowed(tolerance);
-        let is_divided = matches!(tolerance, Tolerance::OfRange(_)) && (last.1[0] - first.1[0]).abs() > allowed;
-        let is_flat = |(_, [_, slope]): Node| is_divided && slope.abs() * (last.0 - first.0) <= allowed;
-        match () {
-            () if is_flat(last) => self.add_towards(first, last, tolerance, at),
-            () if is_flat(first) => self.add_towards(last, first, tolerance, at),
-            () => self.add_between(first, last, tolerance, at),
+        let [start, end] = [first, last].map(|(_, [_, slope])| (slope * (last.0 - first.0)).abs());
+        match [start <= allowed.max(FLAT_RATIO * end), end <= allowed.max(FLAT_RATIO * start)] {
+            [false, true] => self.add_towards(first, last, tolerance, at),
+            [true, false] => self.add_towards(last, first, tolerance, at),
+            [true, true] if (last.1[0] - first.1[0]).abs() > self.allowed(tolerance) * tolerance.unit(first.1[0]) => {
+                let u = 0.5 * (first.0 + last.0);
+                let middle = (u, at(u));
+                self.add(middle.1[0]);
+                self.add_towards(middle, first, tolerance, at);
+                self.add_towards(middle, last, tolerance, at);
+            }
+            _ => self.add_between(first, last, tolerance, at),
         }
     }
 
     /// Extends the range to the values between two nodes, of which the slope vanishes at the second.
     fn add_towards(&mut self, from: Node, flat: Node, tolerance: Tolerance, at: &impl Fn(f64) -> [f64; 2]) {
         let mut before = from;
-        let is_apart = |(u, _): Node| (flat.0 - u).abs() > FLAT_LENGTH;
-        while is_apart(before) && (before.1[0] - flat.1[0]).abs() > self.allowed(tolerance) {
+        let length = |(u, _): Node| (flat.0 - u).abs();
+        while length(before) > ROOT_OF_ROUNDING && before.1[1].abs() * length(before) > self.allowed(tolerance) {
             let u = 0.25 * before.0 + 0.75 * flat.0;
             let next = (u, at(u));
             self.add(next.1[0]);
@@ -141,8 +155,7 @@ impl ValueRange {
             return self.add_extremum([u_0, u_1], [slope_0, slope_1], tolerance, at);
         }
         let length = u_1 - u_0;
-        let unit = if matches!(tolerance, Tolerance::OfValue(_)) { value_0 } else { 1.0 };
-        let mean = (value_1 - value_0) / (length * unit);
+        let mean = (value_1 - value_0) / (length * tolerance.unit(value_0));
         // The slope of the cubic is `slope_0 + bend s + 3 (...) s^2` over the fraction `s`.
         let bend = 2.0 * (3.0 * mean - 2.0 * slope_0 - slope_1);
         let s = bend / (6.0 * (2.0 * mean - slope_0 - slope_1));

@@ -5,9 +5,9 @@
 use super::linear::excess_stiffness;
 use crate::model::Law;
 use crate::model::arcsinh::{reduction, steady_level};
-use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
+use crate::numerics::{MAX_STEPS, ROUNDING_RTOL};
 
 /// The law whose logarithmic friction has the same derivatives at steady sliding at `v > 0`: `a f` and `b f`.
 pub fn linearised(law: Law, v: f64) -> Law {
@@ -77,13 +77,10 @@ fn least_stiffness(law: &Law, ln_mass: f64, highest: f64) -> Option<f64> {
             return None;
         }
         let step = value / slope;
-        if step <= ROUNDING * (1.0 + x.abs()) {
+        if step <= ROUNDING_RTOL * (1.0 + x.abs()) {
             return Some(x);
         }
         x -= step;
     }
     None
 }
-
-/// Relative step that ends the search for the least `k_c`, which is flat there. Chosen: some roundings.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;

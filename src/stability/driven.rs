@@ -1,19 +1,13 @@
 //! Open-loop simulation of the block under the control velocity of a shortcut, continuous or sampled and held.
 //!
-//! With time in units of `t_f`, `x = ln(v/v_f)`, `y = ln(theta v_f)` and `z = k s - tau_ss(v_f)` the equations of
-//! motion are
-//!
-//! ```text
-//! z' = t_f k (v_c - v),    y' = t_f (1/theta - v),    (m v/t_f) x' = z - a x - b y,
-//! ```
-//!
-//! and the target is 0. Without mass the last equation is a constraint. With a rigid spring, `v = v_c`.
+//! In the variables of a [`ScaledBlock`], with time in `l/v_f`, the load point replaces one equation by `z' = k (v_c/v_f - e^x)`, and the target is 0.
+//! With a rigid spring, `v = v_c`.
 
-use super::sensitivity::MIN_PATH_RTOL;
-use super::step_response::scaled_block::{X, Y, Z};
-use crate::model::Law;
+use super::step_response::scaled_block::{ScaledBlock, State, X, Y, Z};
+use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, radau_iia_9};
+use crate::numerics::{ROUNDING_RTOL, TIGHT_RTOL};
 use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::OpenLoopResult;
@@ -32,7 +26,7 @@ pub fn open_loop_error(path: &CompliantPath, rtol: f64) -> OpenLoopResult {
     }
     let driven = Driven::new(path, Control::Continuous(path));
     let mut budget = MAX_STEPS;
-    let end = driven.follow(driven.start(path), (0.0, 1.0), FIRST_STEP, rtol, &mut budget);
+    let end = driven.follow(driven.start(path), (0.0, driven.v_f * path.duration()), rtol, &mut budget);
     OpenLoopResult { number: end.map(|(state, _)| driven.distance(&state)), steps: MAX_STEPS - budget }
 }
 
@@ -48,12 +42,12 @@ pub fn held_error(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, dt: f6
     }
     let mut steps = 0;
     let mut distance = |rtol: f64, parts: f64, shift: f64| {
-        let path = compliant::path(slider, velocities, t_f, (PATH_ACCURACY * rtol).max(MIN_PATH_RTOL)).ok()?;
+        let path = compliant::path(slider, velocities, t_f, (FRACTION * rtol).max(TIGHT_RTOL)).ok()?;
         let sample = |t: f64| (1.0 + shift) * slider.control(&path.at_time(t));
         held_distance(&path, dt, samples as u32, sample, (rtol, parts), &mut steps)
     };
     // Where errors grow, the shift of the control grows with them; steps may stay on an unstable motion by symmetry.
-    let shift = (SHIFT * rtol).max(MIN_SHIFT);
+    let shift = (SHIFT * rtol).max(ROUNDING_RTOL);
     let number = distance(rtol, 1.0, shift).and_then(|shifted| {
         let distance = distance(FINER * rtol, PARTS, 0.0)?;
         ((shifted - distance).abs() <= rtol * (1.0 + distance)).then_some(distance)
@@ -73,33 +67,33 @@ fn held_distance(
 ) -> Option<f64> {
     let (slider, t_f) = (&path.slider, path.duration());
     let sample = |i: u32| sample(f64::from(i) * dt);
-    // In units of t_f.
-    let time = |i: u32| if i == count { 1.0 } else { f64::from(i) * (dt / t_f) };
+    let time = |i: u32| if i == count { t_f } else { f64::from(i) * dt };
     if slider.k == f64::INFINITY {
         let v_f = path.end().v[0];
         let (mut theta, mut v) = (path.jet(0, 0.0).theta, v_f);
         for i in 0..count {
             v = sample(i);
-            let aged = -exp_m1(-t_f * (time(i + 1) - time(i)) * v);
+            let aged = -exp_m1(-(time(i + 1) - time(i)) * v);
             theta += (1.0 / v - theta) * aged;
         }
         return Some(distance(&slider.law, [ln(v / v_f), ln(theta * v_f)]));
     }
     let mut driven = Driven::new(path, Control::Held(0.0));
     let mut budget = MAX_STEPS;
-    let mut state_and_step = Some((driven.start(path), FIRST_STEP));
+    let mut state_and_step = Some(driven.start(path));
     for i in 0..count {
         let Some((state, h)) = state_and_step else { break };
         driven.control = Control::Held(sample(i));
-        let most = (time(i + 1) - time(i)) / parts;
-        state_and_step = driven.follow(state, (time(i), time(i + 1)), h.min(most), rtol, &mut budget);
+        let [from, to] = [time(i), time(i + 1)].map(|t| driven.v_f * t);
+        state_and_step = driven.follow((state, h.min((to - from) / parts)), (from, to), rtol, &mut budget);
     }
     *steps += MAX_STEPS - budget;
     state_and_step.map(|(state, _)| driven.distance(&state))
 }
 
-/// Accuracy of the shortcut, in units of `rtol`. Chosen: its acceleration, which the control contains, has two digits less than its velocity.
-const PATH_ACCURACY: f64 = 0.01;
+/// Accuracy of the shortcut, and error of a step, as fractions of `rtol`. Chosen: the acceleration, which the control contains, has two digits less than
+/// the velocity, and the errors of a hundred steps may add up.
+const FRACTION: f64 = 0.01;
 
 /// Tolerance of the second simulation, relative to the first. Chosen: its error is that of the first to a digit.
 const FINER: f64 = 0.1;
@@ -110,12 +104,6 @@ const PARTS: f64 = 8.0;
 /// Relative shift of the control velocity in the first simulation, in units of `rtol`. Chosen: four digits are left for a control that is the
 /// difference of large terms.
 const SHIFT: f64 = 1e-4;
-
-/// Least relative shift. Derived: some units in the last place, so that it is not lost in rounding.
-const MIN_SHIFT: f64 = 1e-15;
-
-/// First step, in units of `t_f`. Chosen: step-size control shortens it.
-const FIRST_STEP: f64 = 1e-3;
 
 /// Steps of one simulation, at most. Chosen: two for each sample.
 const MAX_STEPS: u32 = 2 * MAX_SAMPLES;
@@ -128,35 +116,36 @@ enum Control<'a> {
 
 /// The equations of motion.
 struct Driven<'a> {
+    block: ScaledBlock,
     slider: SpringBlock,
-    t_f: f64,
     v_f: f64,
     control: Control<'a>,
 }
 
 impl<'a> Driven<'a> {
     fn new(path: &CompliantPath, control: Control<'a>) -> Driven<'a> {
-        Driven { slider: path.slider, t_f: path.duration(), v_f: path.end().v[0], control }
+        let (slider, v_f) = (path.slider, path.end().v[0]);
+        let SpringBlock { law: Law { a, b }, k, m } = slider;
+        let block = ScaledBlock { state_law: StateLaw::Ageing, a, b, inertia: m * v_f * v_f, k };
+        Driven { block, slider, v_f, control }
     }
 
-    /// Steady sliding at the initial velocity.
-    fn start(&self, path: &CompliantPath) -> [f64; 3] {
-        let Law { a, b } = self.slider.law;
-        let x = ln(path.jet(0, 0.0).v[0] / self.v_f);
-        [(a - b) * x, -x, x]
+    /// Steady sliding at the initial velocity, and a first step.
+    fn start(&self, path: &CompliantPath) -> (State, f64) {
+        let state = self.block.steady(ln(path.jet(0, 0.0).v[0] / self.v_f));
+        (state, self.block.first_step(&state))
     }
 
     /// State at the end of a time interval, and the proposed next step; `None` where the integration fails, or the budget
     /// of steps is spent.
     fn follow(
         &self,
-        state: [f64; 3],
+        (state, h): (State, f64),
         (from, to): (f64, f64),
-        h: f64,
         rtol: f64,
         budget: &mut u32,
-    ) -> Option<([f64; 3], f64)> {
-        let accuracy = Accuracy { tolerance: (STEP_ERROR * rtol).max(1e-13), scale: [self.slider.law.a, 1.0, 1.0] };
+    ) -> Option<(State, f64)> {
+        let accuracy = Accuracy { tolerance: (FRACTION * rtol).max(TIGHT_RTOL), scale: [self.block.a, 1.0, 1.0] };
         let mut run = Integrator::new(self, radau_iia_9(), accuracy, from, state, h);
         while run.t() < to {
             *budget = budget.checked_sub(1)?;
@@ -165,46 +154,31 @@ impl<'a> Driven<'a> {
         Some((*run.y(), run.proposal()))
     }
 
-    fn distance(&self, state: &[f64; 3]) -> f64 {
-        let force = state[Z] / self.slider.law.a;
-        (state[X] * state[X] + state[Y] * state[Y] + force * force).sqrt()
+    /// Distance from the target.
+    fn distance(&self, state: &State) -> f64 {
+        norm([state[X], state[Y], state[Z] / self.block.a])
     }
 }
 
-/// Error of a step, fraction of `rtol`. Chosen: the errors of a hundred steps may add up.
-const STEP_ERROR: f64 = 0.01;
+fn norm(errors: [f64; 3]) -> f64 {
+    errors.map(|error| error * error).iter().sum::<f64>().sqrt()
+}
 
 /// Distance from the target for a rigid spring, whose force is friction alone.
 fn distance(law: &Law, [x, y]: [f64; 2]) -> f64 {
-    let force = x + law.b / law.a * y;
-    (x * x + y * y + force * force).sqrt()
+    norm([x, y, x + law.b / law.a * y])
 }
 
 impl System<3> for Driven<'_> {
     fn linearise<const L: usize>(&self, points: &Points<3, L>) -> Linearised<3, L> {
-        let mut at = Linearised { residual: [[0.0; L]; 3], mass: [[1.0; L]; 3], jacobian: [[[0.0; L]; 3]; 3] };
-        let SpringBlock { law: Law { a, b }, k, m } = self.slider;
-        let [z, y, x] = &points.y;
-        let [z_slope, y_slope, x_slope] = &points.slope;
-        // Velocities times t_f.
-        let unit = self.t_f * self.v_f;
+        let mut at = self.block.linearise(points);
         for i in 0..L {
-            let (v, ageing) = (unit * exp(x[i]), unit * exp(-y[i]));
             let v_c = match self.control {
-                Control::Continuous(path) => self.slider.control(&path.at_time(self.t_f * points.t[i])),
+                Control::Continuous(path) => self.slider.control(&path.at_time(points.t[i] / self.v_f)),
                 Control::Held(v_c) => v_c,
             };
-            let mass = m * v / (self.t_f * self.t_f);
-            at.mass[X][i] = mass;
-            at.residual[Z][i] = k * (self.t_f * v_c - v) - z_slope[i];
-            at.residual[Y][i] = (ageing - v) - y_slope[i];
-            at.residual[X][i] = (z[i] - a * x[i] - b * y[i]) - mass * x_slope[i];
-            at.jacobian[Z][X][i] = -k * v;
-            at.jacobian[Y][Y][i] = -ageing;
-            at.jacobian[Y][X][i] = -v;
-            at.jacobian[X][Z][i] = 1.0;
-            at.jacobian[X][Y][i] = -b;
-            at.jacobian[X][X][i] = -a - mass * x_slope[i];
+            // Where both velocities are small, their differences from v_f would lose digits.
+            at.residual[Z][i] = self.block.k * (v_c / self.v_f - exp(points.y[X][i])) - points.slope[Z][i];
         }
         at
     }

@@ -85,12 +85,9 @@ impl SteadySliding {
         }
         let root = self.real_root();
         let real = -root / self.inertia;
-        let [growth, frequency, decay] = match self.pair(root) {
-            RemainingEigenvalues::Complex { growth, frequency } => [growth, frequency, real],
-            // The root found is the least or the greatest of three.
-            RemainingEigenvalues::Real { low, high } if real < low => [high, 0.0, real],
-            RemainingEigenvalues::Real { low, high } => [high.max(real), 0.0, low],
-        };
+        let (low, high, frequency) = self.pair(root);
+        // Of three real roots, the one found is the least or the greatest.
+        let (growth, decay) = if frequency > 0.0 { (high, real) } else { (high.max(real), low.min(real)) };
         Some(Eigenvalues {
             growth_rate: self.v * growth,
             frequency: self.v * frequency,
@@ -113,12 +110,6 @@ pub(super) fn excess_stiffness(law: Law, k: f64) -> f64 {
     let plain = k - (law.b - law.a);
     let cancels = plain.abs() < CANCELLATION * k;
     if cancels { (DoubleDouble::new(k) - DoubleDouble::sum(law.b, -law.a)).high } else { plain }
-}
-
-/// The two eigenvalues apart from a real one, scaled.
-enum RemainingEigenvalues {
-    Complex { growth: f64, frequency: f64 },
-    Real { low: f64, high: f64 },
 }
 
 impl SteadySliding {
@@ -180,8 +171,8 @@ impl SteadySliding {
         (half * half - k / x).high
     }
 
-    /// The two eigenvalues apart from the real one: roots of `x^2 + P x + Q`.
-    fn pair(&self, r: f64) -> RemainingEigenvalues {
+    /// The two eigenvalues apart from the real one, roots of `x^2 + P x + Q`: the lower and the higher real part, and the imaginary part.
+    fn pair(&self, r: f64) -> (f64, f64, f64) {
         let SteadySliding { k, inertia, sum, c, hurwitz, .. } = *self;
         let q = k / r;
         // Two formulas for P: smaller terms lose fewer digits.
@@ -207,11 +198,11 @@ impl SteadySliding {
         }
         if squares < 0.0 {
             // No negative zero at the critical stiffness.
-            return RemainingEigenvalues::Complex { growth: 0.0 - half, frequency: (-squares).sqrt() };
+            return (0.0 - half, 0.0 - half, (-squares).sqrt());
         }
         // The smaller root follows from the product.
         let larger = -(half + squares.sqrt().copysign(half));
         let smaller = q / larger;
-        RemainingEigenvalues::Real { low: larger.min(smaller), high: larger.max(smaller) }
+        (larger.min(smaller), larger.max(smaller), 0.0)
     }
 }

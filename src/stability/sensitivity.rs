@@ -13,10 +13,11 @@
 
 use nalgebra::{DMatrix, DVectorView, Matrix3};
 
-use crate::numerics::MIN_INVERTIBLE;
 use crate::numerics::elementary::exp;
 use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
+use crate::numerics::{LONG_ROUNDING_RTOL, MIN_INVERTIBLE, TIGHT_RTOL};
 use crate::protocol::compliant::{self, CompliantPath};
+use crate::protocol::error::TIGHTEST_RTOL;
 use crate::protocol::{Jet, SpringBlock};
 use crate::stability::OpenLoopResult;
 
@@ -29,12 +30,11 @@ use crate::stability::OpenLoopResult;
 pub fn amplification(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, rtol: f64) -> OpenLoopResult {
     let mut steps = 0;
     let mut confirmed = || {
-        let path = compliant::path(slider, velocities, t_f, (PATH_ACCURACY * rtol).max(MIN_PATH_RTOL)).ok()?;
-        let tolerance = (STEP_ACCURACY * rtol).clamp(STEP_TOLERANCE.start, STEP_TOLERANCE.end);
-        let rough = growth(&path, COARSENING * tolerance, &mut steps)?;
-        let fine = growth(&path, tolerance, &mut steps).filter(|growth| growth.is_finite())?;
-        let agree = (rough - fine).abs() <= rtol * fine.max(MIN_AMPLIFICATION);
-        agree.then_some(if fine < MIN_AMPLIFICATION { 0.0 } else { fine })
+        let path = compliant::path(slider, velocities, t_f, (PATH_ACCURACY * rtol).max(TIGHT_RTOL)).ok()?;
+        let rough = growth(&path, COARSENING * TIGHTEST_RTOL, &mut steps)?;
+        let fine = growth(&path, TIGHTEST_RTOL, &mut steps).filter(|growth| growth.is_finite())?;
+        let agree = (rough - fine).abs() <= rtol * fine.max(LONG_ROUNDING_RTOL);
+        agree.then_some(if fine < LONG_ROUNDING_RTOL { 0.0 } else { fine })
     };
     OpenLoopResult { number: confirmed(), steps }
 }
@@ -42,12 +42,6 @@ pub fn amplification(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, rto
 /// Accuracy of the shortcut, in units of `rtol`. Derived: the relative error of an amplification of `e^700`, the range of doubles, is 700 times that
 /// of the velocity, whose logarithm contains `alpha` times up to some 30.
 const PATH_ACCURACY: f64 = 1e-5;
-
-/// Tightest accuracy of the shortcut: that of the solver.
-pub(super) const MIN_PATH_RTOL: f64 = 1e-13;
-
-/// Amplification below which 0 is returned. Chosen: such an error is below every rounding of a protocol that a computer drives.
-const MIN_AMPLIFICATION: f64 = 1e-12;
 
 /// The amplification by steps with an error of `tolerance`; adds their number to `count`.
 fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> {
@@ -103,10 +97,6 @@ fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> 
 
 /// Steps of the linearised flow, at most. Chosen: enough for some thousand oscillations.
 const MAX_STEPS: u32 = 3_000;
-
-/// Error of a step, in units of `rtol`, and its range. Measured: estimates miss most at the loosest tolerance; below the range there is rounding.
-const STEP_ACCURACY: f64 = 1e-9;
-const STEP_TOLERANCE: std::ops::Range<f64> = 1e-15..1e-13;
 
 /// Tolerance of the first run, in units of that of the second. Chosen: its steps differ, so that rounding differs, too.
 const COARSENING: f64 = 10.0;

@@ -21,7 +21,7 @@ pub fn check(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Re
     let mut factors = Vec::new();
     if let Some(path) = &spec.points {
         let points = points::read(&folder.join(path), units);
-        factors.push(points.map_err(|error| SpecError { key: format!("{prefix}{}", error.key).into(), ..error })?);
+        factors.push(points.map_err(|error| error.each(|fault| fault.key = format!("{prefix}{}", fault.key).into()))?);
     }
     let mut held: Vec<Quantity> = factors.iter().flat_map(|factor| &factor.axes).map(|axis| axis.quantity).collect();
     let axes = spec.axes.iter().map(|(name, axis)| {

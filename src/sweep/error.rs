@@ -61,13 +61,23 @@ impl SpecError {
         self.each(|fault| fault.line = fault.line.or_else(|| read::line(text, &fault.key)))
     }
 
-    /// These faults, if any, and another.
+    /// These faults, if any, and another, each once.
     pub fn and(faults: Option<SpecError>, mut other: SpecError) -> SpecError {
         let Some(mut first) = faults else { return other };
         let others = mem::take(&mut other.others);
-        let known = Vec::from(mem::take(&mut first.others));
-        first.others = known.into_iter().chain([other]).chain(others).take(MAX_FAULTS - 1).collect();
+        let mut known = Vec::from(mem::take(&mut first.others));
+        for fault in iter::once(other).chain(others) {
+            if fault != first && !known.contains(&fault) && known.len() + 1 < MAX_FAULTS {
+                known.push(fault);
+            }
+        }
+        first.others = known.into();
         first
+    }
+
+    /// Whether no other fault has a place.
+    pub fn is_full(&self) -> bool {
+        self.others.len() + 1 >= MAX_FAULTS
     }
 
     /// The faults after a `change` of each.

@@ -259,6 +259,13 @@ impl TableSampler<'_> {
             }
         }
         let parts = rows.div_ceil(self.request.table.rows_per_part());
+        // Rows are compressed together: whole parts tell their size, where they are cheap.
+        let (part, places) = (rows.min(self.request.table.rows_per_part()), parts.min(MIN_RANGES));
+        let threads = self.sampler.pool.current_num_threads() as f64;
+        if seconds.of(places, places * part) < 0.5 * threads * self.budget {
+            let [_, size, of_part] = self.extended(CostSample::default(), part, places, |_| false)?.mean();
+            bytes = LinearCost { range: 0.0, row: size / of_part };
+        }
         Ok(Estimate { seconds: seconds.of(parts, rows), bytes: bytes.of(parts, rows) })
     }
 

@@ -65,10 +65,21 @@ pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
 
 /// The fault of a column of numbers that is no axis.
 fn unknown_axis(path: &Path, name: &str) -> SpecError {
-    let error = unknown("points".to_owned(), "axis", name, &Quantity::ALL.map(Quantity::name));
+    // Spreadsheets write units behind names.
+    let bare = name.split(['(', '[']).next().unwrap_or_default().trim();
+    let error = unknown("points".to_owned(), "axis", bare, &Quantity::ALL.map(Quantity::name));
+    let help = match bare {
+        _ if Quantity::from_name(bare).is_some() => format!("name it `{bare}`; its unit is that of the spec"),
+        "l" | "v_0" | "mu_0" | "normal_stress" => {
+            format!("`{bare}` goes below [model]; samples that differ in it need a spec each")
+        }
+        _ if error.help.starts_with("did you mean") => error.help.to_string(),
+        _ => "remove it; a label of numbers needs letters, as in S1, or quotes, which Parquet does not need for text"
+            .to_owned(),
+    };
     let expected = format!("{}; or a label: text, such as \"S1\", or numbers in quotes", error.expected);
-    let found = format!("{}: {}", path.display(), error.found);
-    SpecError { found: found.into(), expected: expected.into(), ..error }
+    let found = format!("{}: unknown axis `{name}`", path.display());
+    SpecError { found: found.into(), expected: expected.into(), help: help.into(), ..error }
 }
 
 /// Greatest number of points. Chosen: the values of all 16 quantities take 512 MiB of memory.
@@ -99,6 +110,9 @@ fn too_many(path: &Path, found: &str, most: u64) -> SpecError {
 
 /// Greatest length of a label and of its name, in characters. Chosen: it fits a line of a picture.
 const MAX_LABEL_CHARS: usize = 200;
+
+/// A cell without a value, in messages.
+const EMPTY: &str = "an empty cell";
 
 /// A column of a file of points.
 struct Column {
@@ -143,8 +157,7 @@ impl Column {
             Cells::Axis(quantity, _) if quantity.words().is_empty() => match cell.parse::<f64>() {
                 Ok(value) => self.push_number(place, value, units)?,
                 Err(_) => {
-                    let found =
-                        if cell.is_empty() { "an empty cell".to_owned() } else { format!("`{cell}` is not a number") };
+                    let found = if cell.is_empty() { EMPTY.to_owned() } else { format!("`{cell}` is not a number") };
                     return self.wrong(place, &found, "a number with a decimal point, such as 0.03 or 1e-3");
                 }
             },
@@ -170,7 +183,8 @@ impl Column {
     }
 
     fn wrong(&self, place: impl Fn() -> String, found: &str, expected: &str) -> Result<(), SpecError> {
-        Err(fault(format!("{}: column `{}`: {found}", place(), self.name), expected, "correct the value"))
+        let help = if found == EMPTY { "fill it in, or remove the line" } else { "correct the value" };
+        Err(fault(format!("{}: column `{}`: {found}", place(), self.name), expected, help))
     }
 }
 
@@ -190,7 +204,11 @@ fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError>
         Some((line, number)) => header(&place(number), cells_of(&place(number), line)?.iter().map(AsRef::as_ref))?,
         None => Vec::new(),
     };
+    let mut faults: Option<SpecError> = None;
     for (count, (line, number)) in lines.enumerate() {
+        if faults.as_ref().is_some_and(SpecError::is_full) {
+            break;
+        }
         check_count(path, count + 1)?;
         let cells = cells_of(&place(number), line)?;
         // Spreadsheets write empty rows.
@@ -207,14 +225,16 @@ fn csv(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecError>
             return Err(fault(found, "a value for each column", "correct the line"));
         }
         for (column, cell) in columns.iter_mut().zip(cells) {
-            column.push(|| place(number), &cell, units)?;
+            if let Err(fault) = column.push(|| place(number), &cell, units) {
+                faults = Some(SpecError::and(faults, fault));
+            }
             // A cell in quotes is text, also if it reads as a number.
             if let (Cells::Label { has_text, .. }, Cow::Owned(text)) = (&mut column.cells, &cell) {
                 *has_text |= !text.is_empty();
             }
         }
     }
-    Ok(columns)
+    faults.map_or(Ok(columns), Err)
 }
 
 /// The cells of a line of CSV, quoted (and then owned) or not.
@@ -266,6 +286,10 @@ fn parquet(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecEr
             if *array.data_type() == label() {
                 for (row, cell) in texts_of(array).enumerate() {
                     column.push(|| place(row), cell.unwrap_or_default().trim(), units)?;
+                }
+                // Text is a label, also if it reads as a number.
+                if let Cells::Label { has_text, .. } = &mut column.cells {
+                    *has_text = true;
                 }
                 continue;
             }

@@ -82,6 +82,9 @@ const SECTIONS: [(&str, &[&str]); 3] = [
     ("[tables.NAME]", &["columns", "reduce"]),
 ];
 
+/// The help for a missing key, which is the name.
+const HELP_FOR_MISSING: &str = "add it at the top, such as name = \"my_sweep\"; it names the folder of the dataset";
+
 /// The help for a key of the grid in the section of its axes.
 pub const HELP_FOR_GRID_KEY: &str = "write this key above the line [axes]; it is no axis";
 
@@ -94,7 +97,7 @@ pub fn is_grid_key(key: &str) -> bool {
 /// The fault that the parser reports with `message` for the value at `key`, written in `span` of `text`.
 fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecError {
     if let Some(name) = message.strip_prefix("missing field ") {
-        return SpecError::new("", format!("{name} is missing"), format!("a key {name}"), "add the key");
+        return SpecError::new("", format!("{name} is missing"), format!("a key {name}"), HELP_FOR_MISSING);
     }
     if message.starts_with("unknown field ") {
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
@@ -124,6 +127,8 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
         _ if is_grid_key(&key) => HELP_FOR_GRID_KEY,
         "a list" if key == "block" => "write [[block]], with two brackets, above each block",
         "a list" if key.starts_with("zip") => "write a list of lists, such as zip = [[\"a\", \"b\"]]",
+        "a table" if key == "tables" => "write [tables.NAME], such as [tables.optimal], for each table",
+        "a table" if key == "axes" => "write the line [axes], and the axes below it",
         "a list" => "write values in [brackets], and a block as [[block]]",
         expected if expected.starts_with("a number") => HELP_FOR_NUMBER,
         _ => "change the value",

@@ -83,11 +83,6 @@ impl Spec {
         let blocks = self.block.iter().enumerate().map(|(number, block)| (format!("block[{number}]."), block));
         top.into_iter().chain(blocks)
     }
-
-    /// The first definition of an axis.
-    pub fn axis(&self, name: &str) -> Option<&AxisSpec> {
-        self.blocks().find_map(|(_, block)| block.axes.get(name))
-    }
 }
 
 /// `[model]`.

@@ -113,7 +113,10 @@ pub fn doubtful_scales(model: &ModelSpec) -> Vec<SpecError> {
     ];
     let doubtful = scales.into_iter().filter_map(|(name, given, [least, most], unit)| {
         let value = given.filter(|value| !(least..=most).contains(value))?;
-        let expected = format!("usually {least:?} to {most:?}, in {unit}");
+        let expected = match least {
+            _ if most == f64::INFINITY => format!("usually at least {least:?} {unit}"),
+            _ => format!("usually at most {most:?}{}", if unit == "1" { String::new() } else { format!(" {unit}") }),
+        };
         Some(SpecError::new(format!("model.{name}"), format!("{value:?} is unusual"), expected, "check the unit"))
     });
     doubtful.collect()

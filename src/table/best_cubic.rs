@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::{LAW_AXES, OPTIMUM_AXES, transition};
-use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, place, rows};
+use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, rows};
 use crate::grid::{Point, Quantity, Scale};
 use crate::protocol::optimal::Bounds;
 use crate::protocol::{SolverStats, best_cubic, error};
@@ -30,8 +30,6 @@ fields! { Row:
     work_error "mu_0 sigma l" "error bound of work, by a second search", optional => |row| row.work_error;
     v_max "v_0" "greatest velocity of the best shortcut, which v_ceiling does not bound", optional => |row| row.best.v_max;
 }
-
-const WORK_ERROR: usize = place(&COLUMNS, "work_error");
 
 /// One row for each transition and duration, under the laws of a grid with the axis `law`.
 pub static BEST_CUBIC: Table = Table { axes: LAW_AXES, ..BEST_CUBIC_OF_AGEING };
@@ -61,7 +59,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let solved = solve(point, job.rtol);
         let mut stats = solved.stats;
         let row = solved.value.map(|best| {
-            let finest = job.projection.has(WORK_ERROR).then(|| solve(point, error::TIGHTEST_RTOL));
+            let finest = job.projection.has(Index::work_error).then(|| solve(point, error::TIGHTEST_RTOL));
             stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             Row {

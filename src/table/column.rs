@@ -81,6 +81,16 @@ macro_rules! fields {
             cell: $cell,
         }),+];
         const COLUMNS: [$crate::table::Column; FIELDS.len()] = $crate::table::columns(FIELDS);
+
+        /// The indices of the columns.
+        #[allow(dead_code, non_camel_case_types)]
+        enum Index { $($name),+ }
+
+        impl From<Index> for usize {
+            fn from(index: Index) -> usize {
+                index as usize
+            }
+        }
     };
     (@kind ($kind:expr)) => { $kind };
     (@kind $unit:literal) => { $crate::table::Kind::Number($unit) };
@@ -100,27 +110,9 @@ pub const fn columns<R, const N: usize>(fields: &[Field<R>]) -> [Column; N] {
     columns
 }
 
-/// The index of the column with this name. An unknown name in a constant does not compile.
-pub const fn place(columns: &[Column], name: &str) -> usize {
-    let mut place = 0;
-    while !is_same(columns[place].name, name) {
-        place += 1;
-    }
-    place
-}
-
 /// An optional number as a cell: NaN for `None`.
 pub fn number(value: Option<f64>) -> f64 {
     value.unwrap_or(f64::NAN)
-}
-
-const fn is_same(a: &str, b: &str) -> bool {
-    let (a, b) = (a.as_bytes(), b.as_bytes());
-    let mut at = 0;
-    while at < a.len() && at < b.len() && a[at] == b[at] {
-        at += 1;
-    }
-    at == a.len() && at == b.len()
 }
 
 /// Name of the last column of every table.

@@ -52,12 +52,12 @@ impl Projection {
     }
 
     /// Whether the column with this index is requested.
-    pub fn has(&self, index: usize) -> bool {
-        self.0.binary_search(&index).is_ok()
+    pub fn has(&self, index: impl Into<usize>) -> bool {
+        self.0.binary_search(&index.into()).is_ok()
     }
 
     /// Whether any of these columns is requested.
-    pub fn has_any(&self, indices: impl IntoIterator<Item = usize>) -> bool {
+    pub fn has_any(&self, indices: impl IntoIterator<Item = impl Into<usize>>) -> bool {
         indices.into_iter().any(|index| self.has(index))
     }
 }

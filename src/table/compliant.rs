@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::{self, Comparison, transition};
-use super::{ColumnBuffer, Job, Projection, RunStats, Stopped, Table, number, place, rows};
+use super::{ColumnBuffer, Job, Projection, RunStats, Stopped, Table, number, rows};
 use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Mass, Sampling, Stiffness, Time};
 use crate::grid::{Point, Quantity};
 use crate::protocol::compliant::{self, Compliant as Member};
@@ -52,14 +52,6 @@ fields! { Row:
     gap_error "1" "error bound of gap, by a second solve of both works", optional => |row| row.least.gap_error;
 }
 
-const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
-const GAP: usize = place(&COLUMNS, "gap");
-const AMPLIFICATION: usize = place(&COLUMNS, "amplification");
-const SAMPLING_ERROR: usize = place(&COLUMNS, "sampling_error");
-const OPEN_LOOP_ERROR: usize = place(&COLUMNS, "open_loop_error");
-const WORK_ERROR: usize = place(&COLUMNS, "work_error");
-const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
-
 /// One row for each transition, duration, stiffness, mass and sampling interval.
 pub static COMPLIANT: Table = Table {
     name: "compliant",
@@ -73,7 +65,7 @@ pub static COMPLIANT: Table = Table {
 };
 
 fn needs_optimum(projection: &Projection) -> bool {
-    projection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+    projection.has_any([Index::work_optimal, Index::gap, Index::gap_error])
 }
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
@@ -88,13 +80,13 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let mut status = solved.status;
         let mut least = Comparison::NONE;
         if needs_optimum(job.projection) {
-            let bounded = job.projection.has(GAP_ERROR);
+            let bounded = job.projection.has(Index::gap_error);
             let (free, works) = (Bounds::new(job.bounded), (member.work, work_error));
             least = optimum_cache::compare(job, (tuple, point), &free, works, bounded, &mut work);
             status = status.compared_with(least.optimum);
         }
-        let is_held = job.projection.has(SAMPLING_ERROR) && dt > 0.0;
-        let is_followed = job.projection.has(OPEN_LOOP_ERROR);
+        let is_held = job.projection.has(Index::sampling_error) && dt > 0.0;
+        let is_followed = job.projection.has(Index::open_loop_error);
         let held = is_held.then(|| held_error(&slider, velocities(point), t_f, dt, job.rtol));
         let sampling_error = held.and_then(|held| value_of(held, &mut work));
         let path = is_followed.then(|| compliant::path(&slider, velocities(point), t_f, job.rtol).ok()).flatten();
@@ -128,10 +120,10 @@ fn solve(job: &Job<'_>, point: &Point, work: &mut RunStats) -> Solution {
     let (slider, velocities, t_f) = (slider(point), velocities(point), point[Quantity::Time]);
     let solved = compliant::solve(&slider, velocities, t_f, job.rtol);
     *work += RunStats { shortcuts: 1, ..RunStats::from(solved.stats) };
-    let wanted = job.projection.has(AMPLIFICATION) && solved.value.is_some();
+    let wanted = job.projection.has(Index::amplification) && solved.value.is_some();
     let amplification = wanted.then(|| amplification(&slider, velocities, t_f, job.rtol));
     let amplification = amplification.and_then(|followed| value_of(followed, work));
-    let wanted = job.projection.has_any([WORK_ERROR, GAP_ERROR]);
+    let wanted = job.projection.has_any([Index::work_error, Index::gap_error]);
     let work_error = solved.value.filter(|_| wanted).and_then(|member| {
         let finest = compliant::solve(&slider, velocities, t_f, error::TIGHTEST_RTOL);
         *work += RunStats::from(finest.stats);

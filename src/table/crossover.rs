@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::transition;
-use super::{ColumnBuffer, Job, RunStats, Stopped, Table, number, place, rows};
+use super::{ColumnBuffer, Job, RunStats, Stopped, Table, number, rows};
 use crate::grid::Quantity;
 use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
 
@@ -39,14 +39,14 @@ pub static CROSSOVER: Table = Table {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let wanted = |names: [&str; 2]| job.projection.has_any(names.map(|name| place(&COLUMNS, name)));
+    let wanted = |indices: [Index; 2]| job.projection.has_any(indices);
     let wanted = Wanted {
-        cross: wanted(["t_cross", "work_at_t_cross"]),
-        floor: wanted(["t_floor", "work_at_t_floor"]),
-        cheapest: wanted(["t_cheapest", "work_at_t_cheapest"]),
-        min: wanted(["t_min", "work_at_t_min"]),
-        turn: wanted(["t_turn", "work_at_t_turn"]),
-        free: wanted(["t_free_in", "t_free_out"]),
+        cross: wanted([Index::t_cross, Index::work_at_t_cross]),
+        floor: wanted([Index::t_floor, Index::work_at_t_floor]),
+        cheapest: wanted([Index::t_cheapest, Index::work_at_t_cheapest]),
+        min: wanted([Index::t_min, Index::work_at_t_min]),
+        turn: wanted([Index::t_turn, Index::work_at_t_turn]),
+        free: wanted([Index::t_free_in, Index::t_free_out]),
     };
     rows::each(job, range, 64, buffer, FIELDS, |_, point| {
         let (status, times, stats) = crossover::solve(&transition(point), job.bounded, job.rtol, wanted);

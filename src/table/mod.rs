@@ -24,7 +24,7 @@ use crate::grid::{Block, Grid, Point, Quantity, RowIndex, Tuples};
 use crate::model::Friction;
 use crate::protocol::Status;
 
-pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number, place};
+pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
 pub use optimum_cache::{OPTIMUM_AXES, OptimumCache, uncapped_optimum};
 #[cfg(feature = "read")]

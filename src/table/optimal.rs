@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::{self, transition, with_ceilings, work_error};
-use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, place, rows};
+use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, rows};
 use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Law, Time, VelocityCeiling};
 use crate::grid::{Block, Point, Quantity};
 use crate::model::{Friction, StateLaw};
@@ -98,14 +98,6 @@ fields! { Row:
         => |row| row.slope(|slopes| slopes.tau_ceiling);
 }
 
-const WORK_ERROR: usize = place(&COLUMNS, "work_error");
-const T_LEAST: usize = place(&COLUMNS, "t_least");
-const V_CEILING_LEAST: usize = place(&COLUMNS, "v_ceiling_least");
-const TAU_CEILING_LEAST: usize = place(&COLUMNS, "tau_ceiling_least");
-const BOUND: usize = place(&COLUMNS, "bound");
-/// The slopes are the last columns.
-const FIRST_SLOPE: usize = place(&COLUMNS, "dwork_da");
-
 /// One row for each transition, duration and pair of ceilings.
 pub static OPTIMAL: Table = Table {
     name: "optimal",
@@ -120,7 +112,7 @@ pub static OPTIMAL: Table = Table {
 
 /// The slopes come with an optimum of their own.
 fn wants_slopes(projection: &Projection) -> bool {
-    projection.has_any(FIRST_SLOPE..COLUMNS.len())
+    projection.has_any(Index::dwork_da as usize..COLUMNS.len())
 }
 
 /// Whether a row of `block` has the ageing law and no ceiling.
@@ -137,7 +129,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
             return regularised_row(job, (tuple, point), wants_slopes);
         }
         if point.state_law() != StateLaw::Ageing {
-            return relaxed_row(point, wants_slopes, job.projection.has(V_CEILING_LEAST));
+            return relaxed_row(point, wants_slopes, job.projection.has(Index::v_ceiling_least));
         }
         let mut work = RunStats::default();
         let bounds = with_ceilings(job, point);
@@ -149,7 +141,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
             (optimum_cache::optimum(job, (tuple, point), &bounds, &mut work), None)
         };
         let mut row = Row { optimum: solved.value, slopes, ..least(job, point, &bounds, &solved) };
-        if let Some(optimum) = row.optimum.filter(|_| job.projection.has(WORK_ERROR)) {
+        if let Some(optimum) = row.optimum.filter(|_| job.projection.has(Index::work_error)) {
             row.work_error = work_error(point, &bounds, &optimum, &mut work);
         }
         (solved.status, Some(row), work)
@@ -212,15 +204,19 @@ fn relaxed_row(point: &Point, wants_slopes: bool, wants_ceiling: bool) -> rows::
 /// The least feasible numbers that are requested, and the reason of an infeasible row.
 fn least(job: &Job<'_>, point: &Point, bounds: &Bounds, solved: &Solved<Optimum>) -> Row {
     let (transition, t_f, rtol) = (transition(point), point[Quantity::Time], job.rtol);
-    let wanted = |column: usize| job.projection.has(column).then_some(());
+    let wanted = |column: Index| job.projection.has(column).then_some(());
     let is_infeasible = solved.status == Status::Infeasible;
     Row {
-        t_least: wanted(T_LEAST).and_then(|()| optimal::feasible_times(&transition, bounds)).map(|(least, _)| least),
-        v_ceiling_least: wanted(V_CEILING_LEAST)
+        t_least: wanted(Index::t_least)
+            .and_then(|()| optimal::feasible_times(&transition, bounds))
+            .map(|(least, _)| least),
+        v_ceiling_least: wanted(Index::v_ceiling_least)
             .and_then(|()| optimal::least_v_ceiling(&transition, t_f, bounds, rtol)),
-        tau_ceiling_least: wanted(TAU_CEILING_LEAST)
+        tau_ceiling_least: wanted(Index::tau_ceiling_least)
             .and_then(|()| optimal::least_tau_ceiling(&transition, t_f, bounds, rtol)),
-        obstacle: wanted(BOUND).filter(|()| is_infeasible).and_then(|()| optimal::obstacle(&transition, t_f, bounds)),
+        obstacle: wanted(Index::bound)
+            .filter(|()| is_infeasible)
+            .and_then(|()| optimal::obstacle(&transition, t_f, bounds)),
         ..Row::default()
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::compliant::{slider, velocities};
-use super::{ColumnBuffer, Job, RunStats, Stopped, Table, place, rows};
+use super::{ColumnBuffer, Job, RunStats, Stopped, Table, rows};
 use crate::grid::Quantity;
 use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Mass, Smoothing, Stiffness, Time};
 use crate::protocol::regularised::{self, Regularised as Found};
@@ -29,9 +29,6 @@ fields! { Row:
     gap_error "1" "error bound of gap, by a second solve", optional => |row| row.gap_error;
 }
 
-const WORK_ERROR: usize = place(&COLUMNS, "work_error");
-const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
-
 /// One row for each transition, duration, stiffness, mass and length of the smooth pieces.
 pub static REGULARISED: Table = Table {
     name: "regularised",
@@ -51,7 +48,8 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let solved = solve(job.rtol);
         let mut stats = solved.stats;
         let row = solved.value.map(|found| {
-            let finest = job.projection.has_any([WORK_ERROR, GAP_ERROR]).then(|| solve(error::TIGHTEST_RTOL));
+            let finest =
+                job.projection.has_any([Index::work_error, Index::gap_error]).then(|| solve(error::TIGHTEST_RTOL));
             stats += finest.map_or_else(SolverStats::default, |finest| finest.stats);
             let finest = finest.and_then(|finest| finest.value);
             let scale = found.replaced / found.work_optimal;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::column::fields;
 use super::memo::Memo;
 use super::optimum_cache::{self, Comparison, transition};
-use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, place, rows};
+use super::{ColumnBuffer, Job, Kind, Projection, RunStats, Stopped, Table, number, rows};
 use crate::grid::Quantity::{A, B, FinalVelocity, FrictionCeiling, InitialVelocity, Time};
 use crate::grid::{Block, Point, Quantity};
 use crate::protocol::optimal::Bounds;
@@ -49,11 +49,6 @@ fields! { Row:
     gap_error "1" "error bound of gap, by a second solve of both works", optional => |row| row.least.gap_error;
 }
 
-const WORK_OPTIMAL: usize = place(&COLUMNS, "work_optimal");
-const GAP: usize = place(&COLUMNS, "gap");
-const WORK_ERROR: usize = place(&COLUMNS, "work_error");
-const GAP_ERROR: usize = place(&COLUMNS, "gap_error");
-
 /// One row for each transition, duration, family and friction ceiling.
 pub static SHORTCUT: Table = Table {
     name: "shortcut",
@@ -67,7 +62,7 @@ pub static SHORTCUT: Table = Table {
 };
 
 fn needs_optimum(projection: &Projection) -> bool {
-    projection.has_any([WORK_OPTIMAL, GAP, GAP_ERROR])
+    projection.has_any([Index::work_optimal, Index::gap, Index::gap_error])
 }
 
 /// Whether a row of `block` is compared with the optimum without ceilings.
@@ -99,7 +94,7 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         };
         let mut status = member.status();
         if needs_optimum(job.projection) {
-            let bounded = job.projection.has(GAP_ERROR);
+            let bounded = job.projection.has(Index::gap_error);
             let free = Bounds::new(job.bounded);
             // The members of the family obey its own friction ceiling, or none.
             let is_capped = family.uses_tau_ceiling;
@@ -131,7 +126,7 @@ fn solve(job: &Job<'_>, family: &Family, point: &Point, work: &mut RunStats) -> 
     }
     let mut stats = SolverStats::default();
     let solved = family.solve(&case, job.rtol, &mut stats).map(|member| {
-        let wanted = job.projection.has_any([WORK_ERROR, GAP_ERROR]);
+        let wanted = job.projection.has_any([Index::work_error, Index::gap_error]);
         let bound = wanted.then(|| error::of_member(family, &case, &member, &mut stats)).flatten();
         (member, bound.unwrap_or(f64::NAN))
     });

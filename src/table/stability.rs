@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::column::fields;
 use super::optimum_cache::transition;
-use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, number, place, rows};
+use super::{ColumnBuffer, Job, Kind, RunStats, Stopped, Table, number, rows};
 use crate::grid::Quantity;
 use crate::grid::Quantity::{A, B, FinalVelocity, InitialVelocity, Mass, Stiffness};
 use crate::model::{Friction, Law, StateLaw, Transition};
@@ -83,10 +83,6 @@ fields! { Row:
         => |row| number(smooth_eps(&row.transition));
 }
 
-const GROWTH_RATE: usize = place(&COLUMNS, "growth_rate");
-const FREQUENCY: usize = place(&COLUMNS, "frequency");
-const DECAY_RATE: usize = place(&COLUMNS, "decay_rate");
-
 /// One row for each transition, stiffness and mass.
 pub static STABILITY: Table = Table {
     name: "stability",
@@ -100,7 +96,7 @@ pub static STABILITY: Table = Table {
 };
 
 fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Result<RunStats, Stopped> {
-    let with_eigenvalues = job.projection.has_any([GROWTH_RATE, FREQUENCY, DECAY_RATE]);
+    let with_eigenvalues = job.projection.has_any([Index::growth_rate, Index::frequency, Index::decay_rate]);
     rows::each(job, range, 1024, buffer, FIELDS, |_, point| {
         let transition = transition(point);
         let Transition { law, v_i, v_f } = transition;

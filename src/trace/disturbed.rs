@@ -127,7 +127,7 @@ impl OpenLoop {
     fn slip(&self, s: f64) -> f64 {
         let place = self.pieces.partition_point(|piece| piece.start <= s).saturating_sub(1);
         let Some(PlannedPiece { start, length, slip, slips }) = self.pieces.get(place) else { return 0.0 };
-        slip + radau().interpolate(0.0, slips, ((s - start) / length).clamp(0.0, 1.0))
+        slip + radau().interpolate(Some(0.0), slips, ((s - start) / length).clamp(0.0, 1.0))
     }
 }
 

@@ -42,16 +42,16 @@ pub fn rows(folder: &Folder, manifest: &Manifest, table: &ManifestTable, count: 
         let path = folder.part(&table.name, part);
         let expected = range.end - range.start;
         let damaged = |why| State::Damaged { why };
-        let read = match folder.state(manifest, &table.name, part, CheckDepth::Footer) {
-            // The numbers of an edited part are compared, too.
-            State::Damaged { why } => frame::read_all(&path).map_err(|_| damaged(why)),
+        let read = match folder.state(manifest, &table.name, part, CheckDepth::Whole) {
             State::There { .. } => frame::read_all(&path).map_err(|error| damaged(error.reason)),
-            State::Foreign { why: Foreign::OtherProgram } => {
-                frame::read_all(&path).map_err(|error| damaged(error.reason))
-            }
             State::Missing => {
                 sample.missing += inside.count() as u64;
                 continue;
+            }
+            // The numbers of an edited part are compared, too.
+            fault @ (State::Damaged { .. } | State::Foreign { why: Foreign::OtherProgram }) => {
+                sample.fault.get_or_insert_with(|| folder.fault(&path, fault.clone()).to_string());
+                frame::read_all(&path).map_err(|_| fault)
             }
             fault => Err(fault),
         };

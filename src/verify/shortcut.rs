@@ -296,7 +296,10 @@ impl Exponential<'_> {
         let off = followed.worst(|at| {
             let ([p, q], [distance, size]) = terms(at);
             let expected = self.first * (self.l * p + c * q).exp();
-            ((distance - expected).abs() / size - noise * q * expected / size).max(0.0)
+            // In the layers near the least time the rounding of the time counts.
+            let moved = (self.shape)(at.t / self.t_f * (1.0 - 4.0 * f64::EPSILON))[1];
+            let noise = noise * q + c.abs() * (moved - q).abs();
+            ((distance - expected).abs() / size - noise * expected / size).max(0.0)
         });
         [c / unit, off]
     }

@@ -98,28 +98,3 @@ above, below, error = rational(above_branch, mpf(20), (11, 10))
 print("NEAR_ABOVE and NEAR_BELOW", "truncation", nstr(error, 2))
 for c in above + below:
     print("   ", repr(float(c)))
-
-
-def rough(high):
-    """E as (1 + (1 + b_1) p + a_2 p^2 + a_3 p^3)/(1 + b_1 p + b_2 p^2), exact in four Chebyshev nodes and to first order at 0; the greatest relative
-    errors of E and of E ln E."""
-    nodes = [high / 2 * (1 + cos(pi * (2 * j + 1) / 8)) for j in range(4)]
-    system, right = matrix(4, 4), matrix(4, 1)
-    for i, p in enumerate(nodes):
-        value = above_branch(p)
-        system[i, 0], system[i, 1], system[i, 2], system[i, 3] = p - value * p, p**2, p**3, -value * p**2
-        right[i] = value - 1 - p
-    b_1, a_2, a_3, b_2 = lu_solve(system, right)
-    errors = [mpf(0), mpf(0)]
-    for k in range(1, 401):
-        p = high * (mpf(k) / 400) ** 2
-        found = (1 + p * (1 + b_1 + p * (a_2 + p * a_3))) / (1 + p * (b_1 + p * b_2))
-        for i, shift in enumerate([mpf(0), p * p / 2 - 1]):
-            errors[i] = max(errors[i], abs((found + shift) / (above_branch(p) + shift) - 1))
-    return [1 + b_1, a_2, a_3, b_1, b_2], errors
-
-
-coefficients, errors = rough(mpf(20))
-print("ROUGH", "errors of E and of E ln E", nstr(errors[0], 2), nstr(errors[1], 2))
-for c in coefficients:
-    print("   ", repr(float(c)))

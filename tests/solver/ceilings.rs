@@ -383,3 +383,12 @@ fn regress_times_within_roundings_of_the_greatest_are_solved() {
         assert!(solved.value.is_some_and(|found| found.v_end <= v_ceiling), "{t_f} {solved:?}");
     }
 }
+
+/// Steady sliding on the ceiling after a turn that friction near 0 does not allow.
+#[test]
+fn regress_a_turn_where_friction_is_too_low_is_unproven() {
+    let transition = Transition { law: Law { a: 0.03, b: 0.28 }, v_i: 1000.0, v_f: 400.0 };
+    let bounds = Bounds { v_ceiling: 400.0, ..Bounds::from(true) };
+    let solved = solve(&transition, 0.002, bounds, 1e-10);
+    assert_eq!((solved.status, solved.value), (Status::Unproven, None));
+}

@@ -6,8 +6,7 @@ use slipsweep::numerics::dilogarithm::dilogarithm;
 use slipsweep::numerics::double_double::DoubleDouble;
 use slipsweep::numerics::elementary::{exp, exp_and_m1, exp_m1, ln, ln_1p};
 use slipsweep::numerics::gauss::rule;
-use slipsweep::numerics::lambert::{above_branch, rough_near_branches};
-use slipsweep::numerics::lanes::{LANES, Vector};
+use slipsweep::numerics::lanes::LANES;
 use slipsweep::numerics::root::{Probe, newton};
 use slipsweep::numerics::turning::{turning, turning_lanes};
 
@@ -194,18 +193,5 @@ fn exact_zeros_are_those_that_a_cubic_is_made_of() {
                 );
             }
         }
-    }
-}
-
-/// The rough Lambert function, and `E ln E` from it, against the exact one.
-#[test]
-fn the_rough_lambert_function_has_four_digits() {
-    for i in 0..=2000 {
-        let p = 20.0 * f64::from(i) / 2000.0;
-        let d = 0.5 * p * p;
-        let (rough, exact) = (rough_near_branches(Vector::splat(d)).0[0], above_branch(d));
-        assert!((rough / exact - 1.0).abs() <= 4.4e-4, "{d}: {rough} {exact}");
-        let [rough, exact] = [rough, exact].map(|e| e - 1.0 + d);
-        assert!((rough - exact).abs() <= 2.9e-4 * exact + 1e-14, "{d}: {rough} {exact}");
     }
 }

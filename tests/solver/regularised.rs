@@ -676,3 +676,17 @@ fn regress_small_gaps_keep_their_digits() {
         }
     }
 }
+
+/// The velocity overshoots just before the end of the last piece, where its slope vanishes; the greatest is that of a fine trace.
+#[test]
+fn regress_an_overshoot_before_the_end_is_seen() {
+    let slider = SpringBlock {
+        law: Law { a: 0.0015502959734901216, b: 0.00492779049952559 },
+        k: 0.0033774917147892055,
+        m: 3.950586775737542e-22,
+    };
+    let (velocities, t_f, delta_t) =
+        ((1.0013147866638126, 4204805.908084423), 0.0024579918381777924, 0.00030876471182874086);
+    let found = regularised::solve(&slider, velocities, t_f, delta_t, true, 1e-10).value.expect("has numbers");
+    assert!((found.v_max / 4204805.912167092 - 1.0).abs() < 1e-10, "{found:?}");
+}

@@ -429,10 +429,10 @@ fn reference_radau_rule_is_exact_for_its_degree() {
         for u in [0.0, 1e-9, 0.123, 0.5, rule.u[7], 0.999, 1.0] {
             let start = if degree == 0 { 1.0 } else { 0.0 };
             assert!(
-                (rule.interpolate(start, &power, u) - f64::powi(u, degree as i32)).abs() < 1e-14,
+                (rule.interpolate(Some(start), &power, u) - f64::powi(u, degree as i32)).abs() < 1e-14,
                 "{degree} at {u}"
             );
-            assert!((rule.follow(&power, u) - f64::powi(u, degree as i32)).abs() < 1e-14, "{degree} at {u}");
+            assert!((rule.interpolate(None, &power, u) - f64::powi(u, degree as i32)).abs() < 1e-14, "{degree} at {u}");
         }
     }
     // A polynomial that is 0 at 0 may be of one degree more; the rounding is what `bounded_friction` counts with.

@@ -141,7 +141,7 @@ fn conditions<const S: usize>(rule: &Collocation<S>) {
             let (coefficient, size) = sum(&rule.powers[i], &|x| power(x, n));
             near(coefficient, if i + 1 == n { 1.0 } else { 0.0 }, size);
         }
-        let (slope, size) = sum(&rule.start_slope, &|x| power(x, n));
+        let (slope, size) = sum(&rule.powers[0], &|x| power(x, n));
         near(slope, if n == 1 { 1.0 } else { 0.0 }, size);
     }
 }

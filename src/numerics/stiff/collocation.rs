@@ -16,13 +16,11 @@ pub struct Collocation<const S: usize> {
     /// `differentiation[i][j]`: slope at node `i` of the polynomial of degree `S` that is 1 at node `j` and 0 at the
     /// others and at 0. The inverse of [`Collocation::integration`].
     pub differentiation: [[f64; S]; S],
-    /// The slopes of those polynomials at 0.
-    pub start_slope: [f64; S],
     /// The matrix `A` of the method: `integration[i][j]` is the integral from 0 to node `i` of the polynomial of degree
     /// `S - 1` that is 1 at node `j` and 0 at the others.
     pub integration: [[f64; S]; S],
     /// `powers[k][j]`: coefficient of `u^(k+1)` in the polynomial of degree `S` that is 1 at node `j` and 0 at the
-    /// others and at 0.
+    /// others and at 0. The first row has their slopes at 0.
     pub powers: [[f64; S]; S],
 }
 
@@ -55,21 +53,14 @@ impl<const S: usize> Collocation<S> {
                 powers[k][j] = coefficients[k];
             }
         }
-        // Slopes at the nodes from differences of nodes, which are exact.
-        let zero = DoubleDouble::new(0.0);
-        let place = |i: usize| if i < S { c[i] } else { zero };
-        let weight = |i: usize| (0..=S).filter(|&k| k != i).fold(one, |product, k| product * (place(i) - place(k)));
         let slope = |i: usize, j: usize| {
-            if i == j {
-                (0..=S).filter(|&k| k != i).fold(zero, |sum, k| sum + one / (place(i) - place(k)))
-            } else {
-                weight(i) / (weight(j) * (place(i) - place(j)))
-            }
+            let horner = |sum: DoubleDouble, k: usize| sum * c[i] + DoubleDouble::new((k + 1) as f64) * powers[k][j];
+            (0..S).rev().fold(DoubleDouble::new(0.0), horner)
         };
         // int_0^c_i of the polynomial of degree S - 1 in its powers; its coefficients are those of u^1 … u^S times c_j,
         // less one power.
         let integral = |i: usize, j: usize| {
-            let mut sum = zero;
+            let mut sum = DoubleDouble::new(0.0);
             let mut power = one;
             for (k, row) in powers.iter().enumerate() {
                 power = power * c[i];
@@ -80,7 +71,6 @@ impl<const S: usize> Collocation<S> {
         Collocation {
             nodes: c.map(|node| node.high),
             differentiation: std::array::from_fn(|i| std::array::from_fn(|j| slope(i, j).high)),
-            start_slope: std::array::from_fn(|j| slope(S, j).high),
             integration: std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j).high)),
             powers: powers.map(|row| row.map(|value| value.high)),
         }

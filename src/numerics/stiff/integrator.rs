@@ -303,7 +303,7 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
         for r in 0..N {
             let mut sum = 0.0;
             for j in 0..S {
-                sum += self.rule.start_slope[j] * change[r][j];
+                sum += self.rule.powers[0][j] * change[r][j];
             }
             points.y[r][0] = self.y[r];
             points.slope[r][0] = sum / h;

@@ -6,12 +6,12 @@
 
 use crate::model::Law;
 use crate::model::arcsinh::{LOG_LEVEL, friction_rise, reduction, scaled_friction, steady_level};
-use crate::numerics::MIN_INVERTIBLE;
-use crate::numerics::adaptive::integrals;
+use crate::numerics::adaptive::{COARSE_RTOL, integrals};
 use crate::numerics::elementary::{exp, exp_m1, ln};
 use crate::numerics::gauss::rule;
 use crate::numerics::root::{LAST_STEP_RESIDUAL, Probe, newton};
 use crate::numerics::turning::turning;
+use crate::numerics::{MIN_INVERTIBLE, golden_section};
 use crate::protocol::SolverStats;
 
 /// The coordinate along an extremal.
@@ -136,7 +136,7 @@ impl Extremal {
         stats.quadratures += 1;
         let panels = if from < 0.0 && to > 0.0 { vec![(from, -from), (0.0, to)] } else { vec![(from, self.length)] };
         // Time, lag and work are positive.
-        let (sums, nodes) = integrals(|x| self.terms(x), panels, &[whole.time, whole.lag, whole.work])?;
+        let (sums, nodes) = integrals(|x| self.terms(x), panels, &[whole.time, whole.lag, whole.work], COARSE_RTOL)?;
         stats.nodes += nodes;
         let [time, lag, work, a, b] = sums;
         Some(Sums { time, lag, work, by_law: [a, b] })
@@ -161,24 +161,15 @@ impl Extremal {
         let (best, _) = values.iter().enumerate().max_by(|x, y| x.1.total_cmp(y.1))?;
         let width = 1.0 / f64::from(INTERVALS);
         let place = best as f64 * width;
-        let (mut low, mut high) = ((place - width).max(0.0), (place + width).min(1.0));
-        let mut greatest = values[best];
-        for _ in 0..TERNARY_STEPS {
-            let third = (high - low) / 3.0;
-            let [left, right] = [friction(low + third)?, friction(high - third)?];
-            greatest = greatest.max(left).max(right);
-            if left < right { low += third } else { high -= third }
-        }
-        Some(greatest)
+        let around = ((place - width).max(0.0), (place + width).min(1.0));
+        let (_, least) = golden_section::least(|fraction| -friction(fraction).unwrap_or(f64::NEG_INFINITY), around);
+        Some(values[best].max(-least))
     }
 }
 
 /// Intervals of an extremal, inside which friction has at most one maximum. Measured: with so many, all random optima of the physical domain can be
 /// traced (`cargo test random_optima`).
 pub(super) const INTERVALS: u32 = 32;
-
-/// Steps of the search for the greatest friction. Derived: `(2/3)^40` of an interval, squared at a maximum, is below rounding.
-const TERNARY_STEPS: u32 = 40;
 
 impl Point {
     /// The velocity; 0 below the normal numbers.

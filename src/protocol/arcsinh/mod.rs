@@ -135,7 +135,7 @@ impl Problem {
         let mut bracket = [0.0, ln_1p(target * greater).sqrt()];
         let mut values = [if self.ratio > 0.0 { value(0.0) } else { -MAX_LN }, value(bracket[1])];
         let mut step = 0.25;
-        while values[0] > 0.0 && step < MAX_STEP {
+        while values[0] > 0.0 && step < MAX_LN {
             bracket = [bracket[0] - step, bracket[0]];
             values = [value(bracket[0]), values[0]];
             step *= 2.0;
@@ -189,9 +189,6 @@ const MIN_SLOPE: f64 = 1e-4;
 
 /// `-q` above which the start counts by its velocity. Chosen: the turning point is then at `e` times theta, far from the extremal.
 const TURNING_CHART_END: f64 = 1.0;
-
-/// Greatest step of the search for a bracket. Chosen: `ln u` of the fastest start.
-const MAX_STEP: f64 = 1e3;
 
 /// Width at which the search ends, relative to its bracket. Derived: the work is corrected to first order, and the other numbers change as much.
 const BRACKET_RTOL: f64 = 1e-13;

@@ -5,7 +5,7 @@
 //! depends on signs alone, so the method finds minima inside the set, on its border and at its corners, to all digits of the gradient.
 
 use super::plane::{Coefficients, Plane, moved};
-use crate::numerics::MAX_PANELS;
+use crate::numerics::{MAX_PANELS, ROOT_OF_ROUNDING};
 use crate::protocol::SolverStats;
 
 /// An ellipse: the images of the unit circle under `half`, about `centre`.
@@ -37,12 +37,8 @@ pub(super) enum Until {
     Admissible,
 }
 
-/// Relative rounding error of a coefficient. Derived: half a unit in the last place.
-const ROUNDING: f64 = 1e-16;
 /// Relative error of a linear function of the place by rounding of the place. Chosen: a hundred roundings of a double-double number.
 const PLACE_ROUNDING: f64 = 1e-30;
-/// Least ratio of the smaller coefficient, which may vanish, to the larger one. Chosen: the square root of rounding.
-const MIN_COEFFICIENT_RATIO: f64 = 1e-8;
 
 impl Ellipse {
     /// An ellipse that contains every admissible point. The coefficients of a cubic between -1 and 1 on `[0, 1]` are bounded by
@@ -78,8 +74,8 @@ impl Ellipse {
     /// Whether the ellipse is within rounding.
     fn is_rounding(&self) -> bool {
         let [y_1, y_2] = self.centre.map(|y| y.high.abs());
-        let sizes = [y_1 + MIN_COEFFICIENT_RATIO * y_2, y_2 + MIN_COEFFICIENT_RATIO * y_1];
-        self.half.iter().zip(sizes).all(|(row, size)| libm::hypot(row[0], row[1]) <= ROUNDING * size)
+        let sizes = [y_1 + ROOT_OF_ROUNDING * y_2, y_2 + ROOT_OF_ROUNDING * y_1];
+        self.half.iter().zip(sizes).all(|(row, size)| libm::hypot(row[0], row[1]) <= 0.5 * f64::EPSILON * size)
     }
 
     /// Whether a linear function varies in the ellipse by no more than the rounding of a point, so that a cut along it has no effect. Where

@@ -10,21 +10,18 @@
 //! Both terms are at least 0, so the sum has full relative precision, however small it is.
 
 use crate::model::Transition;
-use crate::numerics::MAX_PANELS;
+use crate::numerics::adaptive::integrals;
 use crate::numerics::cubic::ExactCubic;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{ln, ln_1p, phi};
-use crate::numerics::gauss::rule;
 use crate::protocol::cubic::Path;
 use crate::protocol::{SolverStats, optimal};
 
-/// Relative accuracy of the integral. Chosen: a thousandth of the promised 1e-7.
+/// Relative difference of two rules on a panel. Chosen: a thousandth of the promised 1e-7.
 const INTEGRAL_RTOL: f64 = 1e-10;
 /// Negligible error relative to the work, from the rounding of `v - v~`. Derived: the promised absolute error of the gap.
 const NEGLIGIBLE_ERROR: f64 = 1e-20;
-/// Nodes of a panel. Chosen: smooth cases need few panels.
-const NODES: usize = 12;
-/// Greatest number of halvings of a panel, which locate the kinks where the feedback leaves the floor. Chosen: 2^-30 is below the promised error.
+/// Halvings that locate the kink where the feedback leaves the floor. Chosen: 2^-30 is below the promised error.
 const MAX_BISECTIONS: u32 = 30;
 /// Fraction of the shortcut's velocity below which that of the optimum may underflow. Chosen; the budgets of `best_cubic` judge it.
 const MIN_DENSITY: f64 = 1e-3;
@@ -133,28 +130,17 @@ pub(super) fn over_optimum(
 ) -> Option<f64> {
     let t_f = path.ends.t_f;
     let mut excess = Excess { transition, t_f, bounded, stats };
-    let mut panels = Vec::new();
-    let sides = [false, true].map(|from_end| EndPolynomials::of(path, bounded, from_end));
-    for side in &sides {
-        let mut places = layers(side, t_f);
-        // Time at the floor may end before the first node. Elsewhere, halves of a panel may agree by chance.
-        if let Some(kink) = excess.kink(side)? {
-            places.push(kink);
-            places.sort_by(f64::total_cmp);
-            places.dedup();
-        }
-        for ends in places.windows(2) {
-            let whole = panel(&mut |distance| Some(excess.judge(side, distance)?.0), ends[0], ends[1])?;
-            panels.push((side, ends[0], ends[1], whole));
-        }
-    }
-    let tolerance =
-        INTEGRAL_RTOL * panels.iter().map(|panel| panel.3).sum::<f64>().abs() + NEGLIGIBLE_ERROR * work / t_f;
-    let mut left = MAX_PANELS;
+    let negligible = NEGLIGIBLE_ERROR * work / t_f / INTEGRAL_RTOL;
     let mut sum = 0.0;
-    for (side, from, to, whole) in panels {
-        let mut density = |distance| Some(excess.judge(side, distance)?.0);
-        sum += refine(&mut density, (from, to), whole, tolerance, 0, &mut left)?;
+    for from_end in [false, true] {
+        let side = EndPolynomials::of(path, bounded, from_end);
+        let mut places = layers(&side, t_f);
+        // Time at the floor may end before the first node. Elsewhere, both rules may agree by chance.
+        places.extend(excess.kink(&side)?);
+        places.sort_by(f64::total_cmp);
+        let panels = places.windows(2).map(|ends| (ends[0], ends[1] - ends[0])).collect();
+        let density = |distance| Some([excess.judge(&side, distance)?.0]);
+        sum += integrals(density, panels, &[negligible], INTEGRAL_RTOL)?.0[0];
     }
     Some(t_f * sum)
 }
@@ -177,33 +163,4 @@ fn layers(side: &EndPolynomials, t_f: f64) -> Vec<f64> {
 /// `(1 + r) ln(1 + r) - r`, without cancellation near 0.
 fn entropy(r: f64) -> f64 {
     if r > -1.0 { (1.0 + r) * phi(-ln_1p(r)) } else { 1.0 }
-}
-
-fn panel(density: &mut impl FnMut(f64) -> Option<f64>, from: f64, to: f64) -> Option<f64> {
-    let rule = rule(NODES);
-    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let mut sum = 0.0;
-    for (x, w) in rule.x.iter().zip(&rule.w) {
-        sum += w * density(middle + half * x)?;
-    }
-    Some(half * sum)
-}
-
-/// Halves a panel until its halves agree with it to `tolerance`; `None` once no panels are left.
-fn refine(
-    density: &mut impl FnMut(f64) -> Option<f64>,
-    (from, to): (f64, f64),
-    whole: f64,
-    tolerance: f64,
-    depth: u32,
-    left: &mut u32,
-) -> Option<f64> {
-    *left = left.checked_sub(2)?;
-    let middle = 0.5 * (from + to);
-    let halves = [panel(density, from, middle)?, panel(density, middle, to)?];
-    if (halves[0] + halves[1] - whole).abs() <= tolerance || depth >= MAX_BISECTIONS {
-        return Some(halves[0] + halves[1]);
-    }
-    let lower = refine(density, (from, middle), halves[0], tolerance, depth + 1, left)?;
-    Some(lower + refine(density, (middle, to), halves[1], tolerance, depth + 1, left)?)
 }

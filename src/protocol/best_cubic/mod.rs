@@ -18,6 +18,7 @@ use super::cubic::Landscape;
 use super::optimal::Bounds as OptimumBounds;
 use super::{Solved, SolverStats, Status, optimal, relaxed};
 use crate::model::{StateLaw, Transition};
+use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use ellipse::{CutResult, Ellipse, Until};
@@ -46,8 +47,6 @@ pub struct BestCubic {
 
 /// Gap from which the difference of two works, each good to 1e-12, is good to 1e-8 of itself. Derived from these errors.
 const PLAIN_DIFFERENCE: f64 = 1e-4;
-/// Error of that difference, relative to the works. Chosen: ten times the errors of the works.
-const DIFFERENCE_ERROR: f64 = 1e-11;
 
 /// Roundings of the time beyond the least one. Chosen: more than the few operations of the least time lose.
 const ROUNDINGS: f64 = 8.0;
@@ -93,7 +92,8 @@ pub fn solve(transition: &Transition, t_f: f64, bounded: bool, rtol: f64) -> Sol
         difference
     } else {
         // Two routes to one number must agree within the errors of the coarser one, and of W* by the rounding of t_f.
-        let coarse = DIFFERENCE_ERROR * work + ROUNDINGS * f64::EPSILON * t_f * optimum_value.hamiltonian.abs();
+        let coarse =
+            10.0 * LONG_ROUNDING_RTOL * work + ROUNDINGS * f64::EPSILON * t_f * optimum_value.hamiltonian.abs();
         let excess = excess::over_optimum(transition, &path, work, bounded, &mut stats);
         match excess {
             Some(excess) if (excess - difference).abs() <= coarse => excess,

@@ -8,7 +8,7 @@ use std::cell::Cell;
 
 use super::ellipse::Ellipse;
 use super::plane::{Bound, Coefficients, Constraint, Plane, moved};
-use crate::numerics::MAX_STEPS;
+use crate::numerics::{MAX_STEPS, ROOT_OF_ROUNDING, golden_section};
 use crate::protocol::cubic::{Landscape, LandscapeBuffers};
 use crate::protocol::{SolverStats, Status};
 
@@ -26,14 +26,11 @@ const ACTIVE: f64 = 1e-9;
 
 /// Accuracy of the works of the first search. Chosen: works a [`DIFFERENCE`] from a minimum differ by more.
 pub(super) const ROUGH_RTOL: f64 = 1e-8;
-/// Relative width of a set that double precision resolves. Chosen: the first search then knows its border to 1e-8 at the worst.
-const MIN_WIDTH: f64 = 1e-8;
 /// Distance from the border, relative to that from the centre, at which the first search takes the border. Chosen: far above rounding.
 const INSET: f64 = 1e-10;
-/// Relative range of the works in a set which [`ROUGH_RTOL`] resolves. Chosen: a thousand times that.
+/// Relative range of the works in a set which [`ROUGH_RTOL`] resolves; works this close to the least one after the first search are refined. Chosen: a
+/// thousand times that.
 const MIN_RANGE: f64 = 1e3 * ROUGH_RTOL;
-/// Works this close to the least one after the first search are refined. Chosen: a hundred times the accuracy of that search.
-const CLOSE_WORK: f64 = 1e2 * ROUGH_RTOL;
 
 /// Last step of a refinement, in radians and fractions. Derived: the work at a corner is linear in the step, so the step is rounding.
 const LAST_STEP: f64 = 1e-14;
@@ -44,8 +41,6 @@ const INWARDS: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
 const DIFFERENCE: f64 = 1e-3;
 /// Relative difference of works within rounding. Chosen: twice the accuracy of the works.
 const ROUNDING: f64 = 2e-13;
-/// `(sqrt 5 - 1)/2`.
-const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// The coordinates.
 #[derive(Clone)]
@@ -87,7 +82,7 @@ pub(super) fn least(plane: &Plane, rough: &Landscape, ellipse: &Ellipse, stats: 
     let starts = local_minima(&all).into_iter();
     let starts: Vec<Sample> = starts.map(|start| first.refine(start, FIRST_STEP, DIFFERENCE, stats)).collect();
     let close = starts.iter().map(|start| start.work).fold(f64::INFINITY, f64::min);
-    let is_close = |start: &&Sample| start.work <= close + CLOSE_WORK * close.abs();
+    let is_close = |start: &&Sample| start.work <= close + MIN_RANGE * close.abs();
     let found = starts.iter().filter(is_close).map(|&start| polar.settle(start, stats));
     let found = found.min_by(|x, y| x.work.total_cmp(&y.work))?;
     let along = polar.direction(found.angle);
@@ -141,7 +136,7 @@ impl<'a> Polar<'a> {
             let size = polar.centre[0].high.abs() + polar.centre[1].high.abs();
             let width = (p * s - q * r).abs() / (p.abs() + q.abs() + r.abs() + s.abs());
             polar.border.set(1.0);
-            polar.rough = rough.filter(|_| width > MIN_WIDTH * size);
+            polar.rough = rough.filter(|_| width > ROOT_OF_ROUNDING * size);
         }
         Some(polar)
     }
@@ -276,7 +271,7 @@ impl<'a> Polar<'a> {
     fn on_border(&self, angle: f64, stats: &mut SolverStats) -> (Sample, bool) {
         let mut sample = |angle: f64| self.samples([(angle, 1.0)], stats)[0];
         let bounds @ (mut low, mut high) = (angle - 2.0 * DIFFERENCE, angle + 2.0 * DIFFERENCE);
-        let inner = |low: f64, high: f64| low + GOLDEN * (high - low);
+        let inner = |low: f64, high: f64| low + golden_section::FRACTION * (high - low);
         let (mut near, mut far) = (sample(inner(high, low)), sample(inner(low, high)));
         let mut outer = [sample(low).work, sample(high).work];
         let is_flat = |works: [f64; 2], least: f64| works.iter().all(|work| work - least <= ROUNDING * least.abs());

@@ -18,11 +18,10 @@ mod path;
 use super::control::{Tolerance, ValueRange};
 use super::profile::{
     ArrivalProblem, Hermite, InitialState, ProtocolEnd, ResolvedPanel, VelocityCurve, WorkAndFriction, integrate_theta,
-    ln_of_ratio,
 };
 use super::{Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
-use crate::numerics::elementary::ln;
+use crate::numerics::elementary::{ln, ln_near_1};
 
 pub use path::CompliantPath;
 
@@ -129,7 +128,7 @@ fn member(
         return Err(Status::Infeasible);
     }
     let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
-    let rise = ln_of_ratio(w_i, w_f, v_f - v_i);
+    let rise = ln_near_1((v_f - v_i) / w_i, w_f / w_i);
     let curve = VelocityCurve::new(1.0, w_f, t_f, Hermite::flat(rise));
     if v_i == v_f {
         return Ok(curve);

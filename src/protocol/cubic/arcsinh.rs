@@ -5,7 +5,7 @@
 
 use super::{Landscape, LandscapeBuffers, Path};
 use crate::model::arcsinh::scaled_friction;
-use crate::numerics::adaptive::integrals;
+use crate::numerics::adaptive::{COARSE_RTOL, integrals};
 use crate::numerics::elementary::{exp, ln, polynomial};
 use crate::protocol::{SolverStats, Status};
 
@@ -59,7 +59,7 @@ impl Landscape {
             for (centre, from) in [(pair[0], 0.0), (pair[1], -half)] {
                 let (theta, n) = path.about(centre);
                 let integrand = |x: f64| Some([self.power(polynomial(&theta, x), polynomial(&n, x))]);
-                let (sum, more) = integrals(integrand, vec![(from, half)], &[0.0])?;
+                let (sum, more) = integrals(integrand, vec![(from, half)], &[0.0], COARSE_RTOL)?;
                 (work, nodes) = (work + sum[0], nodes + more);
             }
         }

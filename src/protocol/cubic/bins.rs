@@ -166,7 +166,8 @@ impl Bins {
             let mut works = prepared.works(of.state, rule, &mut self.space);
             if of.state != StateLaw::Ageing {
                 // Velocities are not in units of t_f.
-                works = works.map(|work| of.t_f * work);
+                let of_ends = if *whole { of.work_of_ends } else { 0.0 };
+                works = works.map(|work| of_ends + of.t_f * work);
             }
             let (count, first) = (std::mem::take(count), indices[0]);
             if *whole && indices.iter().enumerate().all(|(lane, &i)| i == first + lane) {

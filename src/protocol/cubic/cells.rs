@@ -10,7 +10,7 @@ use multiversion::multiversion;
 use super::bins::CUT_BIN;
 use super::path::{Ends, Path};
 use super::plan::{MIN_GAP, PAIRS, Places, PlannedPanels, SINGLE_PRECISION_ERROR, nearest, places, rooted};
-use super::rules::{MAX_CHEAP_NODES, NODE_STEP, NodeThresholds, ZEROS};
+use super::rules::{MAX_CHEAP_NODES, MAX_ZERO_DISTANCE, NODE_STEP, NodeThresholds, ZEROS};
 use super::{PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::elementary::{INTEGER_SHIFT, rough_ln};
 use crate::numerics::lanes::{LANES, Vector};
@@ -71,9 +71,6 @@ const CORNERS: usize = 4;
 /// Cells per power of 2 below the mean of n, the scale of the feasible set. Measured: more cells need more plans, fewer have worse maps (`cargo
 /// bench --bench landscape`).
 const CELLS_PER_UNIT: f64 = 8.0;
-
-/// Greatest distance of a planned cell from the origin, in cells. Chosen: coordinates of farther cells lose digits.
-const MAX_CELL: f64 = 1e9;
 
 /// Distance of the centre of a map beyond the end, as a fraction of the distance of the nearest zero at the samples. Chosen: no zero of the cell
 /// comes closer.
@@ -373,7 +370,7 @@ fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CE
         let squared = gain[c] > 0.0;
         let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
         let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
-        let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_CELL;
+        let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_ZERO_DISTANCE;
         let none = CellPlan { place: cells[c], ..CellPlan::default() };
         if !(unsure[c] == 0.0 && one_map && meant) {
             return none;

@@ -90,10 +90,9 @@ fn sure(floors: &FrictionBounds, ends: &Ends, a_2: &Lanes, a_3: &Lanes) -> Lanes
     sure
 }
 
-/// Sets the status of the shortcuts with negative friction among consecutive ones on a line in the plane; `path` returns the shortcut at an index.
-pub(super) fn decide<'a>(all: Range<usize>, law: Law, path: impl Fn(usize) -> Path<'a>, status: &mut [Status]) {
-    let is_negative = |i: usize| path(i).friction_min(law) < 0.0;
-    if all.len() > 1 && law.b >= law.a && !is_negative(all.start) && !is_negative(all.end - 1) {
+/// Sets the status of the shortcuts with negative friction among consecutive ones on a line in the plane, along which friction may be concave.
+pub(super) fn decide(all: Range<usize>, is_concave: bool, is_negative: impl Fn(usize) -> bool, status: &mut [Status]) {
+    if all.len() > 1 && is_concave && !is_negative(all.start) && !is_negative(all.end - 1) {
         return;
     }
     for i in all {

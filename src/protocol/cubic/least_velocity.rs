@@ -23,9 +23,6 @@ const NEWTON_STEPS: usize = 6;
 /// Greatest relative change of the velocity that a further Newton step would bring. Chosen: below the rounding of a double.
 const MAX_LAST_CHANGE: f64 = 1e-17;
 
-/// Error of a rough trend in units of its first term. Chosen: thrice the error of the rough `u (1 + ln u)`, which `tests/solver/numerics.rs` bounds.
-const ROUGH_ERROR: f64 = 1e-3;
-
 /// Fraction of a sample below which the parabola through it and its neighbours hints at two zeros. Chosen: a half, for the error of the parabola.
 pub(super) const NEAR_ZERO: f64 = 0.5;
 
@@ -86,20 +83,6 @@ impl Trend {
         let slope = Vector::splat(0.0) - (rate * s + pull + s) * r - theta * jerk;
         Trend { value, slope, factor: pull * theta, theta, u }
     }
-
-    /// The value alone and its first term, with `theta v`.
-    #[inline(always)]
-    fn value<P: Product>(scaled_time: f64, c: &[Vector; 4], x: Vector, u: Vector) -> [Vector; 2] {
-        let [theta, s, r, _] = jet(c, x);
-        let n = Vector::splat(scaled_time) - s;
-        let pull = if P::LAW == StateLaw::Prz {
-            n + n
-        } else {
-            n + scaled_time * (std::f64::consts::E * u - Vector::splat(1.0))
-        };
-        let first = Vector::splat(0.0) - pull * s;
-        [first - theta * r, first]
-    }
 }
 
 /// The least velocities under the law of Perrin, Rice and Zheng, or that of slip.
@@ -138,7 +121,7 @@ fn least_by<P: Product>(ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -
     let open = open::<P>(ends, &c, &n_ends, &end, wanted);
     if open != [0.0; LANES] {
         let at_end = (found.v, found.place);
-        search::<P>(ends, &c, &u_ends, &open, &mut found);
+        search::<P>(ends, &c, &open, &mut found);
         for i in (0..LANES).filter(|&i| open[i] == 0.0) {
             (found.v[i], found.place[i], found.doubt[i]) = (at_end.0[i], at_end.1[i], 0.0);
         }
@@ -217,9 +200,9 @@ fn open<P: Product>(ends: &Ends, c: &[Vector; 4], n_ends: &[Vector; 2], end: &En
 
 /// Searches the shortcuts for velocities below those of `found`.
 #[inline(always)]
-fn search<P: Product>(ends: &Ends, c: &[Vector; 4], u_ends: &[Vector; 2], open: &Lanes, found: &mut Least) {
+fn search<P: Product>(ends: &Ends, c: &[Vector; 4], open: &Lanes, found: &mut Least) {
     let [none, one] = [0.0, 1.0].map(Vector::splat);
-    let Turns { count, mut low, mut high, mut x, doubt } = Turns::of(&trends::<P>(ends.t_f, c, u_ends, open));
+    let Turns { count, mut low, mut high, mut x, doubt } = Turns::of(&trends::<P>(ends.t_f, c));
     // One turn is followed to the minimum.
     let mut left = choose(count - Vector::splat(0.5), choose(count - Vector::splat(1.5), none, Vector(*open)), none);
     let (mut last, mut u, mut theta, mut change) = (Vector::splat(SPACING), one, one, none);
@@ -251,33 +234,16 @@ fn search<P: Product>(ends: &Ends, c: &[Vector; 4], u_ends: &[Vector; 2], open: 
     found.doubt = choose(left, one, choose(doubt, one, none)).0;
 }
 
-/// Trends at even places; those inside are rough where their signs are certain.
+/// Trends at even places.
 #[inline(always)]
-fn trends<P: Product>(scaled_time: f64, c: &[Vector; 4], u_ends: &[Vector; 2], open: &Lanes) -> [Vector; SAMPLES] {
-    let [none, one, step] = [0.0, 1.0, SPACING].map(Vector::splat);
-    let [first, _] = Trend::value::<P>(scaled_time, c, none, u_ends[0]);
-    let mut trends = [first; SAMPLES];
-    [trends[SAMPLES - 1], _] = Trend::value::<P>(scaled_time, c, one, u_ends[1]);
+fn trends<P: Product>(scaled_time: f64, c: &[Vector; 4]) -> [Vector; SAMPLES] {
     // Places are summed up, for the compiler would split the lanes of multiples.
-    let (mut x, mut sure) = (none, one);
-    for sample in &mut trends[1..SAMPLES - 1] {
+    let (mut x, step) = (Vector::splat(0.0), Vector::splat(SPACING));
+    std::array::from_fn(|_| {
+        let Trend { value, .. } = Trend::at::<P>(scaled_time, c, x);
         x = x + step;
-        let n = Vector::splat(scaled_time) - jet(c, x)[1];
-        let [value, first] = Trend::value::<P>(scaled_time, c, x, P::rough(lack(scaled_time, n)));
-        (*sample, sure) = (value, lower(sure, value.map(f64::abs) - ROUGH_ERROR * first.map(f64::abs)));
-    }
-    // Where a sign may be wrong, samples are exact.
-    let unsure = choose(sure, none, Vector(*open));
-    if P::LAW == StateLaw::Slip && unsure != none {
-        x = none;
-        for sample in &mut trends[1..SAMPLES - 1] {
-            x = x + step;
-            let n = Vector::splat(scaled_time) - jet(c, x)[1];
-            let [value, _] = Trend::value::<P>(scaled_time, c, x, P::of(lack(scaled_time, n)));
-            *sample = choose(unsure, value, *sample);
-        }
-    }
-    trends
+        value
+    })
 }
 
 /// Where the trend changes from falling to rising.

@@ -29,7 +29,7 @@ use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::rule;
-use crate::numerics::lanes::LANES;
+use crate::numerics::lanes::{LANES, Lanes};
 use bins::Bins;
 use cells::CellInputs;
 pub use exact::CubicPoint;
@@ -39,9 +39,7 @@ use panel_batch::FrictionTerms;
 pub(super) use path::{Ends, Path, rise};
 use queue::Queue;
 use rules::{MappedPanel, NodeThresholds, Zeros, choose};
-use screen::{
-    BATCH_SPANS, SpanDecision, end_velocities, end_velocities_of_span, inner_velocities, on_side, screen, settle,
-};
+use screen::{BATCH_SPANS, SpanDecision, end_velocities, inner_velocities, on_side, screen, settle};
 pub(super) use work_derivatives::{Basis, WorkDerivatives};
 use works::Works;
 
@@ -120,9 +118,6 @@ impl Landscape {
     ///
     /// The number of shortcuts is the minimum of the lengths of `a_2`, `a_3` and `out.status`.
     pub fn evaluate(&self, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
-        if self.state != StateLaw::Ageing {
-            return other_laws::evaluate(self, a_2, a_3, out);
-        }
         let LandscapeBuffers { work, v_min, status } = out;
         let count = a_2.len().min(a_3.len()).min(status.len());
         let (velocities, works) = (count.min(v_min.len()), count.min(work.len()));
@@ -139,7 +134,7 @@ impl Landscape {
         for start in (0..count).step_by(SPAN_SHORTCUTS * BATCH_SPANS) {
             let group = start..(start + SPAN_SHORTCUTS * BATCH_SPANS).min(count);
             let settled = match (a_2[group.clone()].try_into(), a_3[group.clone()].try_into()) {
-                (Ok(a_2), Ok(a_3)) => settle(&self.ends, &self.floors, a_2, a_3),
+                (Ok(a_2), Ok(a_3)) if self.state == StateLaw::Ageing => settle(&self.ends, &self.floors, a_2, a_3),
                 _ => [None; BATCH_SPANS],
             };
             for (first, common) in group.clone().step_by(SPAN_SHORTCUTS).zip(settled) {
@@ -159,8 +154,13 @@ impl Landscape {
         let Evaluation { status, works, doubtful, .. } = evaluation;
         let stats = works.finish();
         // Up to this point the status determines on which side of v = 1 a velocity is.
+        let is_negative = |i: usize| {
+            let path = Path::new(&self.ends, a_2[i], a_3[i]);
+            let is_ageing = self.state == StateLaw::Ageing;
+            (if is_ageing { path.friction_min(self.law) } else { self.friction_min(&path) }) < 0.0
+        };
         for open in doubtful {
-            decide(open, self.law, |i| Path::new(&self.ends, a_2[i], a_3[i]), status);
+            decide(open, self.law.b >= self.law.a, is_negative, status);
         }
         bins.keep();
         stats
@@ -247,8 +247,9 @@ impl Evaluation<'_> {
         if !sound {
             self.doubtful.push(first..first + SPAN_SHORTCUTS);
         }
-        if first < self.v_min.len() {
-            self.velocities_of_span(first, a_2, a_3);
+        let eights = a_2.as_chunks::<LANES>().0.iter().zip(a_3.as_chunks::<LANES>().0);
+        for (eight, (a_2, a_3)) in eights.enumerate() {
+            self.velocities(first + eight * LANES, a_2, a_3, &[status; LANES]);
         }
         self.works.push_span(first, a_2, a_3);
     }
@@ -261,21 +262,27 @@ impl Evaluation<'_> {
         let (mut a_2_lanes, mut a_3_lanes) = ([0.0; LANES], [0.0; LANES]);
         a_2_lanes[..a_2.len()].copy_from_slice(a_2);
         a_3_lanes[..a_3.len()].copy_from_slice(a_3);
-        let found = screen(ends, &a_2_lanes, &a_3_lanes);
-        self.status[block.clone()].copy_from_slice(&found[..block.len()]);
+        let mut found = screen(ends, &a_2_lanes, &a_3_lanes);
         if found.iter().all(|&found| found == Status::Infeasible) {
+            self.status[block].fill(Status::Infeasible);
             return;
         }
         let unsure = self.of.floors.open(ends, &a_2_lanes, &a_3_lanes, &found);
         let unsure = block.clone().enumerate().filter(|(lane, _)| unsure & (1 << lane) != 0);
         self.doubtful.extend(unsure.map(|(_, i)| i..i + 1));
-        if first < self.v_min.len() {
-            let mut least = [0.0; LANES];
-            let left = end_velocities(ends, &a_2_lanes, &a_3_lanes, &found, &mut least);
-            for ((v_min, least), found) in self.v_min[first..].iter_mut().zip(least).zip(found) {
-                *v_min = if found == Status::Infeasible { *v_min } else { least };
+        if self.of.state == StateLaw::Ageing {
+            self.status[block.clone()].copy_from_slice(&found[..block.len()]);
+            self.velocities(first, &a_2_lanes, &a_3_lanes, &found);
+        } else {
+            // The velocity decides between the other two.
+            let least = self.of.least_velocities(&a_2_lanes, &a_3_lanes, &found);
+            for (found, (v, i)) in found.iter_mut().zip(least.into_iter().zip(block.clone())) {
+                if *found != Status::Infeasible {
+                    *found = if v < 1.0 { Status::BelowBound } else { Status::Ok };
+                    self.v_min.get_mut(i).into_iter().for_each(|v_min| *v_min = v);
+                }
             }
-            self.search(first, left, &a_2_lanes, &a_3_lanes);
+            self.status[block.clone()].copy_from_slice(&found[..block.len()]);
         }
         for (lane, i) in block.enumerate() {
             if self.status[i] != Status::Infeasible {
@@ -284,31 +291,21 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Writes the least velocities of a span of feasible shortcuts with one status; uncertain ones are queued.
+    /// Writes the least velocities of up to eight shortcuts from `first` on, if requested; uncertain ones are queued.
     #[inline(always)]
-    fn velocities_of_span(&mut self, first: usize, a_2: &PerShortcut, a_3: &PerShortcut) {
-        let (ends, status) = (&self.of.ends, self.status[first]);
-        let wanted = &mut self.v_min[first..];
-        let left = match wanted.first_chunk_mut() {
-            Some(wanted) => end_velocities_of_span(ends, a_2, a_3, status, wanted),
-            None => {
-                let mut least = [0.0; SPAN_SHORTCUTS];
-                let left = end_velocities_of_span(ends, a_2, a_3, status, &mut least);
-                wanted.copy_from_slice(&least[..wanted.len()]);
-                left
-            }
-        };
-        match wanted.first_chunk_mut() {
-            Some(wanted) if left == u32::MAX => {
-                *wanted = inner_velocities(ends, a_2, a_3).map(|found| on_side(found, status));
-            }
-            _ => self.search(first, left, a_2, a_3),
+    fn velocities(&mut self, first: usize, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) {
+        let mut least = [0.0; LANES];
+        let Some(wanted) = self.v_min.get_mut(first..) else { return };
+        let left = end_velocities(&self.of.ends, a_2, a_3, found, &mut least);
+        for ((v_min, least), found) in wanted.iter_mut().zip(least).zip(found) {
+            *v_min = if *found == Status::Infeasible { *v_min } else { least };
         }
+        self.search(first, left, a_2, a_3);
     }
 
     /// Queues the shortcuts from `first` on that have a bit in the mask for a search of their least velocities, if requested.
     #[inline(always)]
-    fn search<const N: usize>(&mut self, first: usize, mut left: u32, a_2: &[f64; N], a_3: &[f64; N]) {
+    fn search(&mut self, first: usize, mut left: u32, a_2: &Lanes, a_3: &Lanes) {
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;

@@ -4,62 +4,20 @@
 //! panels are those of an ageing path of the duration `c t_f` ([`Ends::under`]). At the zeros of `n` the integrand has a square root in place of a
 //! logarithm. Under the slip law `tau v = T v - a theta'/theta` with `T = 1 + (b - a) ln theta`, so that the work needs no logarithm of the velocity.
 
+use super::Landscape;
 use super::least_velocity::{Least, NEAR_ZERO, least_velocities};
 use super::path::Path;
 use super::rules::MappedPanel;
-use super::screen::screen;
-use super::works::Works;
-use super::{Bins, Landscape, LandscapeBuffers};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::numerics::lambert::above_branch;
 use crate::numerics::lanes::{LANES, Lanes};
 use crate::numerics::root::crossing;
-use crate::protocol::{SolverStats, Status};
-
-/// Evaluates the shortcuts of a landscape under another law than ageing.
-pub(super) fn evaluate(of: &Landscape, a_2: &[f64], a_3: &[f64], out: LandscapeBuffers<'_>) -> SolverStats {
-    let LandscapeBuffers { work, v_min, status } = out;
-    let count = a_2.len().min(a_3.len()).min(status.len());
-    let wanted = count.min(work.len());
-    let mut bins = Bins::take();
-    bins.cells.begin(&of.frame);
-    let mut works = Works::new(of, &mut work[..wanted], &mut bins);
-    for first in (0..count).step_by(LANES) {
-        let block = first..(first + LANES).min(count);
-        let (mut a_2_lanes, mut a_3_lanes) = ([0.0; LANES], [0.0; LANES]);
-        a_2_lanes[..block.len()].copy_from_slice(&a_2[block.clone()]);
-        a_3_lanes[..block.len()].copy_from_slice(&a_3[block.clone()]);
-        let found = screen(&of.ends, &a_2_lanes, &a_3_lanes);
-        status[block.clone()].fill(Status::Infeasible);
-        if found[..block.len()].iter().all(|&found| found == Status::Infeasible) {
-            continue;
-        }
-        let doubtful = of.floors.open(&of.ends, &a_2_lanes, &a_3_lanes, &found);
-        let velocities = of.least_velocities(&a_2_lanes, &a_3_lanes, &found);
-        for (lane, i) in block.enumerate().filter(|&(lane, _)| found[lane] != Status::Infeasible) {
-            let own = if velocities[lane] < 1.0 { Status::BelowBound } else { Status::Ok };
-            let is_doubtful = doubtful & (1 << lane) != 0;
-            let friction = if is_doubtful { of.friction_min(&Path::new(&of.ends, a_2[i], a_3[i])) } else { 1.0 };
-            status[i] = own.with_friction(friction);
-            if let Some(v_min) = v_min.get_mut(i) {
-                *v_min = velocities[lane];
-            }
-            works.push(i, a_2[i], a_3[i]);
-        }
-    }
-    let stats = works.finish();
-    bins.keep();
-    if of.work_of_ends != 0.0 {
-        let feasible = work[..wanted].iter_mut().zip(status).filter(|(_, status)| **status != Status::Infeasible);
-        feasible.for_each(|(work, _)| *work += of.work_of_ends);
-    }
-    stats
-}
+use crate::protocol::Status;
 
 impl Landscape {
     /// The least velocities of feasible shortcuts; others are meaningless.
-    fn least_velocities(&self, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) -> Lanes {
+    pub(super) fn least_velocities(&self, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) -> Lanes {
         let wanted = found.map(|found| if found == Status::Infeasible { 0.0 } else { 1.0 });
         let Least { mut v, place, doubt, lossy } = least_velocities(self.state, &self.ends, a_2, a_3, &wanted);
         for i in (0..LANES).filter(|&i| wanted[i] * (doubt[i] + lossy[i]) > 0.0) {
@@ -119,7 +77,7 @@ impl Landscape {
     }
 
     /// The least friction on a feasible shortcut.
-    fn friction_min(&self, path: &Path) -> f64 {
+    pub(super) fn friction_min(&self, path: &Path) -> f64 {
         let Law { a, b } = self.law;
         let friction = |x: f64| {
             let (v, theta) = (self.velocity(path, x), path.at(x).0);

@@ -3,7 +3,7 @@
 //! In `x = t/t_f`: `theta = theta_0 + A_2 x + A_3 x^2 + A_4 x^3` and `n = t_f (1 - theta') = t_f - dtheta/dx`, so `v =
 //! n/(t_f theta)`.
 
-use super::rules::{MIN_THIRD, NodeThresholds};
+use super::rules::NodeThresholds;
 use crate::model::StateLaw;
 use crate::numerics::MAX_STEPS;
 use crate::numerics::cubic::{Cubic, ExactCubic, exact_quadratic_zeros};
@@ -138,20 +138,6 @@ impl<'a> Path<'a> {
         } else {
             Status::BelowBound
         }
-    }
-
-    /// The complex pair of zeros of theta near its least value, if the closed form has no correct digit of their distance from the real axis.
-    /// Returns real part, imaginary part, and a distance within which the closed form places these two zeros, but not the third one.
-    pub fn close_pair(&self) -> Option<(f64, f64, f64)> {
-        let [c0, c1, c2, c3] = self.theta.c;
-        let x = self.theta.minimum();
-        let half_bend = c2 + 3.0 * c3 * x;
-        let third = -c2 / c3 - 2.0 * x;
-        let alone = (third - x).abs() > MIN_THIRD || third.is_nan();
-        let reach = MIN_THIRD.min(0.5 * (third - x).abs());
-        let least = self.exact_theta().at(x).high;
-        let close = least < 1e-6 * (c0.abs() + c1.abs() + c2.abs() + c3.abs());
-        (x > 0.0 && alone && close && half_bend > 0.0 && least > 0.0).then(|| (x, (least / half_bend).sqrt(), reach))
     }
 
     /// The coefficients of theta and of n in powers of `x - 1`.

@@ -51,9 +51,6 @@ pub(super) const MIN_GAP: f64 = 1e-10;
 /// Indices of zeros that may be complex, each followed by its conjugate or by another real zero; all others are real.
 pub(super) const PAIRS: [usize; 2] = [1, 3];
 
-/// The weight of a doubtful zero of n. Chosen: more than all zeros of theta.
-const N_DOUBT_WEIGHT: f32 = 8.0;
-
 /// Whether zeros have few digits; undecided shortcuts go to the next plan.
 const fn is_coarse<T: Real>() -> bool {
     size_of::<T>() < size_of::<f64>()
@@ -135,7 +132,7 @@ pub(super) fn places<T: Real>(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut)
     }
     let mut places = Places { re, im, doubt };
     places.polish_near_start(ends, a_2, a_3);
-    places.settle_close_pairs(ends, a_2, a_3);
+    places.mark_close_pairs();
     // A pair is counted once.
     for k in PAIRS {
         for i in 0..SPAN_SHORTCUTS {
@@ -172,29 +169,15 @@ impl<T: Real> Places<T> {
         }
     }
 
-    /// Marks pairs near the real axis as doubtful, since the closed forms do not determine their distance from it. A pair of theta is checked
-    /// again.
+    /// Marks pairs near the real axis as doubtful, since the closed forms do not determine their distance from it.
     #[inline(always)]
-    fn settle_close_pairs(&mut self, ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) {
+    fn mark_close_pairs(&mut self) {
         let Places { re, im, doubt } = self;
         for k in 0..ZEROS {
             let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THIRD } else { MIN_PAIR });
-            let weight = if k < THETA_ZEROS { 1.0 } else { N_DOUBT_WEIGHT };
             for i in 0..SPAN_SHORTCUTS {
                 let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
-                doubt[i] += if close { weight } else { 0.0 };
-            }
-        }
-        for i in 0..SPAN_SHORTCUTS {
-            let of_theta = !is_coarse::<T>() && doubt[i] > 0.0 && doubt[i] < N_DOUBT_WEIGHT;
-            let pair = of_theta.then(|| Path::new(ends, a_2[i], a_3[i]).close_pair()).flatten();
-            if let Some((x, height, reach)) = pair {
-                for k in 0..THETA_ZEROS {
-                    if (re[k][i].wide() - x).abs() < reach && im[k][i].wide() < reach {
-                        (re[k][i], im[k][i]) = (T::of(x), T::of(height));
-                    }
-                }
-                doubt[i] = 0.0;
+                doubt[i] += if close { 1.0 } else { 0.0 };
             }
         }
     }
@@ -275,7 +258,7 @@ fn panels<T: Real, const SQUARINGS: u32>(
     // A zero beyond the end is given by its distance from 1.
     for i in 0..SPAN_SHORTCUTS {
         let blurred = (side[i] > zero) & (high[i] == 1.0) & (gap[i] > zero) & (gap[i] < T::of(MIN_GAP));
-        doubt[i] += if blurred { N_DOUBT_WEIGHT } else { 0.0 };
+        doubt[i] += if blurred { 1.0 } else { 0.0 };
     }
     // A focal sum is reduced by the possible error of the zeros.
     let lost = if is_coarse::<T>() { SINGLE_PRECISION_ERROR } else { 0.0 };

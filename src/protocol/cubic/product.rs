@@ -1,7 +1,7 @@
 //! `theta v` and the numbers at a node for eight shortcuts at a time, under each evolution law of the state.
 
 use crate::model::StateLaw;
-use crate::numerics::lambert::{NEAR_END, far_branch, near_branches, rough_near_branches};
+use crate::numerics::lambert::{NEAR_END, far_branch, near_branches};
 use crate::numerics::lanes::{Vector, choose, least, lower};
 
 /// `theta v` as a function of the lack `n/t_f` in every lane, without branches: [`StateLaw::product`].
@@ -11,12 +11,6 @@ pub(super) trait Product {
 
     /// `theta v`.
     fn of(lack: Vector) -> Vector;
-
-    /// `theta v` to 4.4e-4.
-    #[inline(always)]
-    fn rough(lack: Vector) -> Vector {
-        Self::of(lack)
-    }
 
     /// Velocity and `tau'`, both times `theta n`, and `theta n`, from theta, `n`, `a n'` over the unit of `tau'`, and `1/t_f`.
     #[inline(always)]
@@ -70,11 +64,6 @@ impl Product for NearSlip {
     fn of(lack: Vector) -> Vector {
         (1.0 / std::f64::consts::E) * near_branches(lack)
     }
-
-    #[inline(always)]
-    fn rough(lack: Vector) -> Vector {
-        (1.0 / std::f64::consts::E) * rough_near_branches(lack)
-    }
 }
 
 impl Product for Slip {
@@ -85,12 +74,6 @@ impl Product for Slip {
         // Each lane has the formula of its own argument, whatever the others hold.
         let far = lack.map(|lack| (1.0 / std::f64::consts::E) * far_branch(lack));
         choose(lack - Vector::splat(NEAR_END), far, NearSlip::of(lack))
-    }
-
-    #[inline(always)]
-    fn rough(lack: Vector) -> Vector {
-        let far = lack.map(|lack| (1.0 / std::f64::consts::E) * far_branch(lack));
-        choose(lack - Vector::splat(NEAR_END), far, NearSlip::rough(lack))
     }
 }
 

@@ -90,9 +90,6 @@ impl MappedPanel {
 /// Number of nodes up to which no better map is searched. Measured: the search costs as much as about sixteen nodes, and a larger power cannot save
 /// many (`cargo bench --bench landscape`).
 pub(super) const MAX_CHEAP_NODES: usize = 32;
-/// Number of nodes from which the sinh map is tried. Measured: its logarithms and exponentials pay off from there on (`cargo bench --bench
-/// landscape`).
-const MIN_SINH_NODES: usize = 40;
 /// Number of nodes above which a panel is cut: that of the last bin.
 const MAX_UNCUT_NODES: usize = BINS * NODE_STEP;
 /// Greatest number of nodes of a panel. Chosen: more than any panel needs after cuts.
@@ -278,34 +275,20 @@ pub(super) fn choose(
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn best_panel(zeros: &Zeros, low: f64, high: f64, accuracy: &NodeThresholds) -> (MappedPanel, f64) {
-    let mut best = (line(zeros, low, high), 2.0);
+    let mut best = (line(zeros, low, high), focal(&zeros.re, &zeros.im, low, high));
     let plain = accuracy.enough(MAX_CHEAP_NODES);
+    if best.1 >= plain {
+        return best;
+    }
     let gaps = [real_gap(zeros, high, 1.0), real_gap(zeros, low, -1.0)];
     let (nearest, gap, other) = if gaps[0] <= gaps[1] { (1.0, gaps[0], gaps[1]) } else { (-1.0, gaps[1], gaps[0]) };
-    // A real zero this close excludes the plain rule without computing its ellipse.
-    let hopeless = 2.0 + 4.0 * gap / (high - low) < plain;
-    if !hopeless {
-        best.1 = focal(&zeros.re, &zeros.im, low, high);
-        if best.1 >= plain {
-            return best;
-        }
-    }
     for (side, gap) in [(nearest, gap), (-nearest, other)] {
         best = power(zeros, [low, high], (side, gap), plain, best);
         if best.1 >= plain {
             return best;
         }
     }
-    if hopeless {
-        let straight = focal(&zeros.re, &zeros.im, low, high);
-        if straight > best.1 {
-            best = (line(zeros, low, high), straight);
-        }
-    }
-    if best.1 < accuracy.enough(MIN_SINH_NODES) {
-        best = sinh(zeros, low, high, best);
-    }
-    best
+    sinh(zeros, low, high, best)
 }
 
 /// The plain rule, expanded about the end nearer to the limiting zero, where the polynomials are small.

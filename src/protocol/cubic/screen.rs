@@ -11,7 +11,6 @@ use super::path::{Ends, Path};
 use super::{PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::cubic::Cubic;
 use crate::numerics::lanes::{LANES, Lanes};
-use crate::numerics::real::Real;
 use crate::numerics::root::LAST_STEP_RESIDUAL;
 use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
 use crate::protocol::Status;
@@ -240,7 +239,7 @@ fn sign_of(value: f64, doubt: f64) -> f64 {
 }
 
 /// Writes the lesser end velocity of eight feasible shortcuts as their least velocity, and returns a bit for each shortcut where that is not
-/// certain.
+/// certain. An end with `v = m` has the least velocity if the cubic `n - m t_f theta` has no coefficient below 0.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
@@ -252,35 +251,8 @@ pub(super) fn end_velocities(
     status: &[Status; LANES],
     v_min: &mut Lanes,
 ) -> u32 {
-    ending(ends, a_2, a_3, status, v_min)
-}
-
-/// Writes the results of a span with one status.
-#[multiversion(targets(
-    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx+avx2+bmi1+bmi2"
-))]
-pub(super) fn end_velocities_of_span(
-    ends: &Ends,
-    a_2: &PerShortcut,
-    a_3: &PerShortcut,
-    status: Status,
-    v_min: &mut PerShortcut,
-) -> u32 {
-    ending(ends, a_2, a_3, &[status; SPAN_SHORTCUTS], v_min)
-}
-
-/// An end with `v = m` has the least velocity if the cubic `n - m t_f theta` has no coefficient below 0.
-#[inline(always)]
-fn ending<const N: usize>(
-    ends: &Ends,
-    a_2: &[f64; N],
-    a_3: &[f64; N],
-    status: &[Status; N],
-    v_min: &mut [f64; N],
-) -> u32 {
-    let mut open = [0; N];
-    for i in 0..N {
+    let mut open = [0; LANES];
+    for i in 0..LANES {
         let path = Path::new(ends, a_2[i], a_3[i]);
         let (v, place) = path.v_ends();
         let surplus = path.surplus(v * ends.t_f);
@@ -311,48 +283,17 @@ pub(super) fn inner_velocities(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut
     v_min
 }
 
-/// Stationary points of `n/theta` by Newton's method, in single precision except for the last step. If the cubic `n - v t_f theta` does not
-/// prove that the velocity `v` there is the least, [`lower`] continues. Returns the least velocities, their positions, and 1 where rounding
-/// matters; infeasible lanes are meaningless.
+/// The least velocities, their positions, and 1 where rounding matters; infeasible lanes are meaningless.
 #[multiversion(targets(
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 fn least(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> [PerShortcut; 3] {
-    let [mut v_min, mut place, mut due] = [[0.0; SPAN_SHORTCUTS]; 3];
-    let rough = rough_places(ends, a_2, a_3);
+    let [mut v_min, mut place] = [[0.0; SPAN_SHORTCUTS]; 2];
     for i in 0..SPAN_SHORTCUTS {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        let (theta_end, n_end) = path.about_end();
-        let (theta_start, n_start) = (path.theta.c[0], path.n.c[0]);
-        // Ratios are compared without a division.
-        let first = n_start * theta_end[0] < n_end[0] * theta_start;
-        let (n, theta) = (if first { n_start } else { n_end[0] }, if first { theta_start } else { theta_end[0] });
-        let x = nearer(path.theta.c, ends.t_f, f64::from(rough[i]));
-        let (n_there, theta_there) = (path.n.at(x), path.theta.at(x));
-        let inside = (x > 0.0) & (x < 1.0) & (n_there * theta < n * theta_there) & (n_there > 0.0);
-        let (n, theta) = (if inside { n_there } else { n }, if inside { theta_there } else { theta });
-        let x = if inside {
-            x
-        } else if first {
-            0.0
-        } else {
-            1.0
-        };
-        let v = n / (ends.t_f * theta);
-        // Without its value and slope at x, the cubic is the square of the distance times a linear function.
-        let [_, c1, c2, c3] = path.surplus(v * ends.t_f).c;
-        let slope = c1 + x * (2.0 * c2 + 3.0 * x * c3);
-        let (below, above) = (c2 + 2.0 * x * c3, c2 + c3 + 2.0 * x * c3);
-        let factor = if below < above { below } else { above };
-        let outward = if first { slope >= 0.0 } else { slope <= 0.0 };
-        let settled = (factor > 0.0) & ((slope * slope < SLOPE_SQUARED * n * factor) | (!inside & outward));
-        (v_min[i], place[i]) = (v, x);
-        due[i] = if settled { 0.0 } else { 1.0 };
+        (v_min[i], place[i]) = Path::new(ends, a_2[i], a_3[i]).v_ends();
     }
-    if due != [0.0; SPAN_SHORTCUTS] {
-        lower(ends, a_2, a_3, &mut v_min, &mut place, due);
-    }
+    lower(ends, a_2, a_3, &mut v_min, &mut place);
     let mut lossy = [0.0; SPAN_SHORTCUTS];
     for i in 0..SPAN_SHORTCUTS {
         let path = Path::new(ends, a_2[i], a_3[i]);
@@ -364,71 +305,11 @@ fn least(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> [PerShortcut; 3] 
     [v_min, place, lossy]
 }
 
-/// Guesses of the minima: a few Newton steps from the least of some samples.
-#[inline(always)]
-fn rough_places(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut) -> [f32; SPAN_SHORTCUTS] {
-    let t_f = ends.t_f as f32;
-    let mut theta = [[0.0f32; SPAN_SHORTCUTS]; 4];
-    for i in 0..SPAN_SHORTCUTS {
-        let path = Path::new(ends, a_2[i], a_3[i]);
-        for (theta, c) in theta.iter_mut().zip(path.theta.c) {
-            theta[i] = c as f32;
-        }
-    }
-    let mut place = [0.0f32; SPAN_SHORTCUTS];
-    for i in 0..SPAN_SHORTCUTS {
-        let [c0, c1, c2, c3] = [theta[0][i], theta[1][i], theta[2][i], theta[3][i]];
-        let (mut least, mut of) = (t_f - c1, c0);
-        for x in [0.25, 0.5, 0.75, 1.0] {
-            let theta = c0 + x * (c1 + x * (c2 + x * c3));
-            let n = t_f - (c1 + x * (2.0 * c2 + 3.0 * x * c3));
-            let less = n * of < least * theta;
-            (least, of) = (if less { n } else { least }, if less { theta } else { of });
-            place[i] = if less { x } else { place[i] };
-        }
-    }
-    for _ in 0..ROUGH_STEPS {
-        for i in 0..SPAN_SHORTCUTS {
-            place[i] = nearer([theta[0][i], theta[1][i], theta[2][i], theta[3][i]], t_f, place[i]);
-        }
-    }
-    place
-}
-
-/// A Newton step from `x` towards the minimum of `n/theta`, within `[0, 1]`.
-#[inline(always)]
-fn nearer<T: Real>([c0, c1, c2, c3]: [T; 4], t_f: T, x: T) -> T {
-    let [zero, one, two, three, six] = [0.0, 1.0, 2.0, 3.0, 6.0].map(T::of);
-    let theta = c0 + x * (c1 + x * (c2 + x * c3));
-    let slope = c1 + x * (two * c2 + three * c3 * x);
-    let bend = two * c2 + six * c3 * x;
-    let n = t_f - slope;
-    // theta^2 d(n/theta)/dx with the other sign, and its derivative.
-    let (fall, change) = (bend * theta + n * slope, six * c3 * theta + n * bend);
-    let next = x - fall / change;
-    let within = if next > zero { next } else { zero };
-    let within = if within < one { within } else { one };
-    if change < zero { within } else { x }
-}
-
-/// Newton steps in single precision. Derived: from the best of five samples, three steps suffice before a last one in double precision.
-const ROUGH_STEPS: usize = 3;
-
-/// Squared slope of `n - v t_f theta`, relative to `n` and the curvature, that affects the velocity. Derived: a quarter of it is the relative
-/// change of the velocity.
-const SLOPE_SQUARED: f64 = 1e-15;
-
 /// The least velocity by Dinkelbach's method (Management Science 13, 492, 1967): `v = n/(t_f theta) >= m` where the cubic `n - m t_f theta` is
 /// not negative. The minimum of this cubic gives the next, lower `m`. The steps decrease to the least ratio, and each doubles the digits.
 #[inline(always)]
-fn lower(
-    ends: &Ends,
-    a_2: &PerShortcut,
-    a_3: &PerShortcut,
-    v_min: &mut PerShortcut,
-    place: &mut PerShortcut,
-    mut due: PerShortcut,
-) {
+fn lower(ends: &Ends, a_2: &PerShortcut, a_3: &PerShortcut, v_min: &mut PerShortcut, place: &mut PerShortcut) {
+    let mut due = [1.0; SPAN_SHORTCUTS];
     for _ in 0..MAX_STEPS {
         for i in 0..SPAN_SHORTCUTS {
             let path = Path::new(ends, a_2[i], a_3[i]);

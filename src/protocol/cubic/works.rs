@@ -145,7 +145,7 @@ impl Sums<'_> {
     fn settle(&mut self, plan: &PlannedPanels, lane: usize, index: usize, place: [f64; 2]) {
         let bin = plan.bin[lane] as usize;
         if bin < CUT_BIN {
-            self.work[index] = 0.0;
+            self.work[index] = self.of.work_of_ends;
             self.stats.quadratures += 1;
             self.stats.nodes += nodes_of(bin);
             self.bins.add(self.of, (plan, lane), [place[0], place[1], 0.0, 1.0], index, self.work);
@@ -168,13 +168,13 @@ impl Sums<'_> {
             // A shortcut may be fastest at the cut.
             let near = path.is_within(if low[k] == 0.0 { high[k] } else { low[k] }, of.accuracy.longest);
             if near && lanes.iter().all(|&lane| plan.bin[lane] < BINS as u32) {
-                work[i] = 0.0;
+                work[i] = of.work_of_ends;
                 for lane in lanes {
                     stats.nodes += nodes_of(plan.bin[lane] as usize);
                     bins.add(of, (&plan, lane), [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
                 }
             } else {
-                work[i] = of.work(&path, stats);
+                work[i] = of.work_of_ends + of.work(&path, stats);
             }
         }
     }

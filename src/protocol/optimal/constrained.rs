@@ -210,7 +210,8 @@ fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stat
             let turn = path.insert(Path::of(problem, turn));
             search::read(problem, ceilings, &turn.view(), turn.extremal.work(problem, &sums), sums.friction_min)
         });
-        let Some((of_turn, value)) = read else { return Constrained::without_numbers(Status::NotConverged, stats) };
+        let failure = || (search::failure(problem, ceilings, f64::INFINITY), None);
+        let (of_turn, value) = read.unwrap_or_else(failure);
         let Some(value) = value else { return Constrained::without_numbers(of_turn, stats) };
         (status, optimum) = (of_turn, Optimum { v_end: v, theta_max: problem.to.theta, ..value });
     }

@@ -260,7 +260,7 @@ pub(super) fn free(problem: &Problem, time: Time, rtol: f64, guess: &Guess) -> F
 
 /// The status of a search without a solution: a defect, unless no protocol has friction at both ends that proves its
 /// extremal the only one, or friction was too low for that on the way.
-fn failure(problem: &Problem, ceilings: &Ceilings, met: f64) -> Status {
+pub(super) fn failure(problem: &Problem, ceilings: &Ceilings, met: f64) -> Status {
     let under_ceilings = |steady: f64, y: f64| steady + problem.law.a * ceilings.cap(y);
     let start = under_ceilings(problem.friction_start(), problem.depth());
     let least = start.min(under_ceilings(problem.friction_end(), 0.0)).min(met);

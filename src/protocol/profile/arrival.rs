@@ -19,7 +19,7 @@
 
 use multiversion::multiversion;
 
-use super::curve::{CurvePanel, VelocityCurve, x_and_z_at_nodes};
+use super::curve::{CurvePanel, HALVES, VelocityCurve, x_and_z_at_nodes};
 use super::{Exponent, panel_variation};
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau, radau};
@@ -156,7 +156,7 @@ impl<E: Exponent> ArrivalProblem<E> {
         let mut count = 0;
         stats.quadratures += 1;
         let scale = curve.exponent.size();
-        for range in curve.panel_ranges().backward() {
+        for range in HALVES.map(|half| half.reversed()).into_iter().rev() {
             let mut d = range.from;
             while d != range.to {
                 let panel = curve.panel(&range, d, panel_variation);

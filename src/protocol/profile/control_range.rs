@@ -41,7 +41,7 @@ impl ResolvedPanel {
             (u, [value, duration * slope])
         };
         let between =
-            |u: f64| along(u, &self.jet(curve, u), radau().interpolate(theta_second_start, &theta_seconds, u)).1;
+            |u: f64| along(u, &self.jet(curve, u), radau().interpolate(Some(theta_second_start), &theta_seconds, u)).1;
         let mut before = (0.0, between(0.0));
         for ((u, theta, rate), theta_second) in self.nodes().zip(theta_seconds) {
             let (x, z) = self.x_and_z(u);

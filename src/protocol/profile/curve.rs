@@ -4,7 +4,6 @@
 //! rounding of `x`.
 
 use super::Exponent;
-use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Nodes, Radau};
 
@@ -38,6 +37,12 @@ pub struct CurvePanel {
     pub from: f64,
     pub to: f64,
 }
+
+/// Both halves of a protocol in the order of time, each measured from its end.
+pub const HALVES: [CurvePanel; 2] = [
+    CurvePanel { side: ProtocolEnd::Start, from: 0.0, to: 0.5 },
+    CurvePanel { side: ProtocolEnd::End, from: 0.5, to: 0.0 },
+];
 
 impl<E: Exponent> VelocityCurve<E> {
     /// Velocity that ends at `floor + w_f` after a time `t_f`.
@@ -85,11 +90,6 @@ impl<E: Exponent> VelocityCurve<E> {
         (w, excess)
     }
 
-    /// Ranges of panels in the order of time: first those measured from the start, then those from the end.
-    pub fn panel_ranges(&self) -> PanelRanges {
-        self.exponent.panel_ranges(self.ln_w_f, self.reference_level() - NEGLIGIBLE_LN)
-    }
-
     /// `ln(v - floor)`.
     fn level(&self, x: f64, z: f64) -> f64 {
         self.ln_w_f + self.exponent.value(x, z)
@@ -106,12 +106,6 @@ impl<E: Exponent> VelocityCurve<E> {
         let CurvePanel { side, to, .. } = *range;
         let (x, z) = x_and_z(side, d);
         let e = self.level(x, z) - self.reference_level();
-        if e < -NEGLIGIBLE_LN + 1.0
-            && self.level_at(side, to) - self.reference_level() < -NEGLIGIBLE_LN + 1.0
-            && self.exponent.has_minimum()
-        {
-            return CurvePanel { side, from: d, to };
-        }
         let along = if (side == ProtocolEnd::Start) == (to > d) { 1.0 } else { -1.0 };
         let slope = along * self.exponent.slope(x, z);
         // The interpolation error of NODES nodes is proportional to the NODESth power of the variation, times v - floor.
@@ -125,11 +119,6 @@ impl<E: Exponent> VelocityCurve<E> {
         let h = self.exponent.distance_of_variation(x, z, variation);
         let left = (to - d).abs();
         CurvePanel { side, from: d, to: if h >= left { to } else { d + h * (to - d) / left } }
-    }
-
-    fn level_at(&self, side: ProtocolEnd, d: f64) -> f64 {
-        let (x, z) = x_and_z(side, d);
-        self.level(x, z)
     }
 
     /// `v` at the end of a panel.
@@ -196,25 +185,5 @@ impl CurvePanel {
         } else {
             CurvePanel { to: self.from + longest * (self.to - self.from) / length, ..*self }
         }
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.from == self.to
-    }
-}
-
-/// Ranges of panels of a protocol in the order of time, some of them empty.
-#[derive(Debug, Clone, Copy)]
-pub struct PanelRanges {
-    pub panels: [CurvePanel; 4],
-}
-
-impl PanelRanges {
-    pub fn forward(&self) -> impl Iterator<Item = CurvePanel> {
-        self.panels.into_iter().filter(|panel| !panel.is_empty())
-    }
-
-    pub fn backward(&self) -> impl Iterator<Item = CurvePanel> {
-        self.panels.into_iter().rev().map(|panel| panel.reversed()).filter(|panel| !panel.is_empty())
     }
 }

@@ -5,7 +5,6 @@
 //! `p > 0` stretches the start, `q > 0` the end.
 
 use super::Exponent;
-use super::curve::{CurvePanel, PanelRanges, ProtocolEnd};
 use crate::numerics::MAX_STEPS;
 
 /// The Hermite exponent.
@@ -115,7 +114,7 @@ fn shifted(powers: &[f64; 6], d: f64) -> [f64; 6] {
 }
 
 impl Exponent for Hermite {
-    const INTERPOLATION: f64 = 0.45;
+    const INTERPOLATION: f64 = 0.35;
 
     fn with(self, c: f64) -> Hermite {
         Hermite { c, ..self }
@@ -188,15 +187,5 @@ impl Exponent for Hermite {
 
     fn newton_step(ratio: f64) -> f64 {
         (1.0 - 1.0 / (ratio * ratio * ratio)) / 3.0
-    }
-
-    fn has_minimum(&self) -> bool {
-        false
-    }
-
-    fn panel_ranges(&self, _level: f64, _depth: f64) -> PanelRanges {
-        let half = |side| CurvePanel { side, from: 0.0, to: 0.5 };
-        let empty = CurvePanel { side: ProtocolEnd::End, from: 0.5, to: 0.5 };
-        PanelRanges { panels: [half(ProtocolEnd::Start), empty, empty, half(ProtocolEnd::End).reversed()] }
     }
 }

@@ -11,11 +11,11 @@ mod hermite;
 mod motion;
 mod theta;
 
-use crate::numerics::elementary::{exp, ln, ln_1p};
+use crate::numerics::elementary::{exp, ln};
 use crate::numerics::radau::NODES;
 
 pub(super) use arrival::ArrivalProblem;
-pub(super) use curve::{CurvePanel, PanelRanges, ProtocolEnd, VelocityCurve};
+pub(super) use curve::{ProtocolEnd, VelocityCurve};
 pub(super) use hermite::Hermite;
 pub(super) use motion::ResolvedProfile;
 pub(super) use theta::{InitialState, ResolvedPanel, WorkAndFriction, integrate_theta};
@@ -49,12 +49,6 @@ pub(super) trait Exponent: Copy + Sync {
     /// Relative Newton step in a large `c` that makes a quantity `ratio` times as large, times minus its logarithmic slope.
     /// The quantity is proportional to the width of the layers at both ends.
     fn newton_step(ratio: f64) -> f64;
-
-    /// Whether the exponent falls first and then rises, so that it is low between two low positions.
-    fn has_minimum(&self) -> bool;
-
-    /// Ranges of panels of a curve that ends at `v_1 = floor + e^level`; `ln(v - floor)` below `depth` is negligible.
-    fn panel_ranges(&self, level: f64, depth: f64) -> PanelRanges;
 }
 
 /// Variation of an exponent over a panel whose interpolation at the nodes has the relative accuracy `rtol`. An
@@ -62,10 +56,4 @@ pub(super) trait Exponent: Copy + Sync {
 fn panel_variation(rtol: f64) -> f64 {
     let factorial: f64 = (1..=NODES).map(|k| k as f64).product();
     (4.0 * exp(ln(0.01 * rtol * factorial) / NODES as f64)).clamp(2.0, 6.0)
-}
-
-/// `ln(w_1/w_0)` of two velocities above a floor that differ by `difference`.
-pub(super) fn ln_of_ratio(w_0: f64, w_1: f64, difference: f64) -> f64 {
-    let change = difference / w_0;
-    if change > -0.5 { ln_1p(change) } else { ln(w_1 / w_0) }
 }

@@ -8,7 +8,7 @@ use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
 use super::arrival::total;
-use super::curve::{CurvePanel, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
+use super::curve::{CurvePanel, HALVES, ProtocolEnd, VelocityCurve, x_and_z, x_and_z_at_nodes};
 use super::{Exponent, panel_variation};
 use crate::model::Law;
 use crate::numerics::elementary::{exp, exp_m1, ln};
@@ -76,7 +76,7 @@ pub fn integrate_theta<E: Exponent>(
     let (mut slip, mut off) = (0.0, if slow { lag(curve, ProtocolEnd::Start, 0.0, v) } else { 1.0 });
     let mut count = 0;
     stats.quadratures += 1;
-    for range in curve.panel_ranges().forward() {
+    for range in HALVES {
         let mut d = range.from;
         while d != range.to {
             let mut panel = curve.panel(&range, d, panel_variation);
@@ -209,12 +209,12 @@ impl ResolvedPanel {
 
     /// Theta at the fraction `u` of the panel.
     pub fn theta(&self, u: f64) -> f64 {
-        radau().interpolate(self.theta_start, &self.theta, u)
+        radau().interpolate(Some(self.theta_start), &self.theta, u)
     }
 
     /// `theta'` at the fraction `u` of the panel.
     pub fn rate(&self, u: f64) -> f64 {
-        radau().interpolate(self.rate_start, &self.rate, u)
+        radau().interpolate(Some(self.rate_start), &self.rate, u)
     }
 
     /// `theta''` at the start and at the nodes of a panel of this duration, as slopes of the interpolated `theta'`. The

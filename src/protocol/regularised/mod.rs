@@ -13,6 +13,7 @@ use super::error::TIGHTEST_RTOL;
 use super::optimal::{PathPoint, Route, route};
 use super::{Motion, Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
+use crate::numerics::MAX_SQUARABLE;
 use motion::RegularisedMotion;
 use smooth_piece::{PieceEnd, SmoothPiece};
 
@@ -146,9 +147,6 @@ fn is_doubtful(status: Status) -> bool {
 /// solver stress::regularised`).
 const SPARE_ACCURACY: f64 = 30.0;
 
-/// Velocity of a piece, in `v_0`, at least. Chosen: far above the underflow of doubles.
-const MIN_VELOCITY: f64 = 1e-100;
-
 /// Sums and extremes along the protocol.
 struct Assembly {
     slider: SpringBlock,
@@ -232,7 +230,7 @@ impl Assembly {
     ) -> Result<(), Status> {
         let span = route.span(from, to);
         let piece = SmoothPiece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
-        if piece.v.low < MIN_VELOCITY {
+        if piece.v.low < 1.0 / MAX_SQUARABLE {
             return Err(Status::Infeasible);
         }
         self.excess += piece.totals.work - span.work;

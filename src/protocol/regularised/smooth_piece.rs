@@ -11,16 +11,14 @@
 //! takes about a quarter of the mean for every `rho`. An end where theta has the time to follow `1/v` is not stretched.
 
 use crate::model::Law;
-use crate::numerics::elementary::ln;
+use crate::numerics::elementary::{ln, ln_near_1};
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_SQUARABLE};
 use crate::protocol::control::{Tolerance, ValueRange};
 use crate::protocol::optimal::{PathSegment, lag_at_bound};
 use crate::protocol::profile::{
     ArrivalProblem, Hermite, InitialState, ResolvedProfile, VelocityCurve, WorkAndFriction, integrate_theta,
-    ln_of_ratio,
 };
 use crate::protocol::{Jet, SolverStats, SpringBlock, Status};
-
-use super::MIN_VELOCITY;
 
 /// State at an end of a piece.
 #[derive(Debug, Clone, Copy)]
@@ -96,15 +94,15 @@ impl SmoothPiece {
         rtol: f64,
         stats: &mut SolverStats,
     ) -> Result<SmoothPiece, Status> {
-        if start.v[0].min(end.v[0]) < MIN_VELOCITY {
+        if start.v[0].min(end.v[0]) < 1.0 / MAX_SQUARABLE {
             return Err(Status::Infeasible);
         }
         let (w_0, w_1) = (start.v[0] - floor, end.v[0] - floor);
-        let rise = ln_of_ratio(w_0, w_1, w_1 - w_0);
+        let rise = ln_near_1((w_1 - w_0) / w_0, w_1 / w_0);
         // About the mean of v that brings theta to its target.
         let mean = lag / (time * (start.theta * end.theta).sqrt()) - floor;
         let rho = [start, end].map(|at| if at.outer { (at.v[0] - floor) / mean } else { 1.0 });
-        if rho.iter().any(|&rho| rho > MAX_RHO) {
+        if rho.iter().any(|&rho| rho > 1.0 / LONG_ROUNDING_RTOL) {
             return Err(Status::Infeasible);
         }
         let mut stretch = rho.map(stretch);
@@ -154,6 +152,3 @@ fn stretch(rho: f64) -> f64 {
 
 /// Slip before the end of the protocol after which theta follows `1/v`, in `l`, at least. Chosen: `e^-5` is 0.7 %, what is left of an initial deviation.
 const RELAXATION_SLIP: f64 = 5.0;
-
-/// Height `rho` of an end above the mean, at most. Chosen: a higher end needs a fall too short for doubles.
-const MAX_RHO: f64 = 1e12;

@@ -5,6 +5,7 @@
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::{Law, Transition};
+use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::dilogarithm::dilogarithm;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::rule;
@@ -66,9 +67,6 @@ impl Relaxation {
     }
 }
 
-/// `p` at which `e^-p` is below the rounding of 1. Derived: `37 > 53 ln 2`.
-const RELAXED_P: f64 = 37.0;
-
 impl Motion for Relaxation {
     fn duration(&self) -> f64 {
         self.t_f
@@ -76,7 +74,7 @@ impl Motion for Relaxation {
 
     fn landmarks(&self) -> Vec<f64> {
         let (end, finest_scale) = (self.v_f * self.t_f, self.finest_scale());
-        let relaxed = RELAXED_P + ln_1p(self.decay.k.max(0.0));
+        let relaxed = NEGLIGIBLE_LN + ln_1p(self.decay.k.max(0.0));
         let mut landmarks = vec![0.0];
         let mut p = finest_scale;
         while p < 0.9 * end {

@@ -48,10 +48,6 @@ const MAX_CHANGE: f64 = 6.0;
 /// there (`cargo bench --bench step_response`).
 const IMPLICIT_FROM: f64 = 15.0;
 
-/// Length of a step, in units of the fastest motion, below which implicit steps become series. Chosen: less than
-/// [`IMPLICIT_FROM`], so that the kinds do not alternate.
-const SERIES_BELOW: f64 = 10.0;
-
 /// Duration of a slip of a light block on a soft spring, fraction of the rest before it, at least. Chosen: far below those
 /// of the physical domain.
 const SHORTEST_SLIP: f64 = 1e-120;
@@ -108,7 +104,7 @@ impl Integration<'_> {
         let rates = Rates::of(slider.state_law, state[Y], state[X]);
         let fast = slider.fast(&rates);
         // False for numbers out of range.
-        let short = fast * self.integrator.proposal() < SERIES_BELOW;
+        let short = fast * self.integrator.proposal() < 2.0 * MAX_REACH;
         if !self.uses_series && !short {
             return None;
         }

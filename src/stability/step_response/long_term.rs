@@ -316,7 +316,7 @@ impl<'a> Follower<'a> {
 }
 
 /// Convergence of consecutive cycles.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct CycleConvergence {
     /// Last change of the section point.
     change: f64,
@@ -329,20 +329,6 @@ struct CycleConvergence {
     low_change: f64,
     /// Number of cycles with changes below a fraction of `rtol`.
     small_changes: u32,
-}
-
-impl Default for CycleConvergence {
-    fn default() -> CycleConvergence {
-        let unknown = f64::NAN;
-        CycleConvergence {
-            change: unknown,
-            ratios: [unknown; 2],
-            first_change: unknown,
-            low: unknown,
-            low_change: unknown,
-            small_changes: 0,
-        }
-    }
 }
 
 impl CycleConvergence {

@@ -117,10 +117,8 @@ impl VelocityStep {
     pub fn from_simulation(&self, simulation: Option<&Simulation>, rtol: f64) -> (Status, Option<Response>) {
         let Transition { v_i, v_f, .. } = self.transition;
         let lowest = simulation.and_then(|simulation| simulation.low).map_or(v_f, |low| v_f * exp(low.x)).min(v_i);
-        let response = match simulation {
-            Some(simulation) => Response::new(simulation, v_f, rtol),
-            None => Some(Response::at_once(v_f)),
-        };
+        let at_once = Simulation::known(LongTermBehaviour::Settled { time: 0.0 });
+        let response = Response::new(simulation.unwrap_or(&at_once), v_f, rtol);
         let status = match response {
             None => Status::Infeasible,
             Some(response) if response.v_trough.min(lowest) < 1.0 => Status::BelowBound,
@@ -154,20 +152,6 @@ impl ScaledStep {
 }
 
 impl Response {
-    /// Response with the velocity `v_f` from the start.
-    fn at_once(v_f: f64) -> Response {
-        Response {
-            outcome: Outcome::Settled,
-            v_peak: v_f,
-            v_trough: v_f,
-            t_peak: None,
-            settling_time: Some(0.0),
-            cycle: None,
-            t_end: 0.0,
-            steps: 0,
-        }
-    }
-
     /// Response in the units of the model; `None` where the velocity becomes infinite.
     fn new(simulation: &Simulation, v_f: f64, rtol: f64) -> Option<Response> {
         let velocity = |x: f64| v_f * exp(x);

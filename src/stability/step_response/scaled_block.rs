@@ -11,6 +11,7 @@
 //! and `(e^-y - e^(x + q))/2` for the law of Perrin, Rice and Zheng. The equations are regular for `M = 0`, where the last
 //! is a constraint, and at every velocity.
 
+use super::envelope::MIN_STEP_ERROR;
 use crate::model::StateLaw;
 use crate::numerics::elementary::{exp, exp_and_m1, ln};
 use crate::numerics::stiff::{Linearised, Points, System};
@@ -27,9 +28,6 @@ pub type State = [f64; 3];
 
 /// Point of the section `v = v_f`, crossed upwards: the logarithm of the force about which the block oscillates, and `y`.
 pub type SectionPoint = [f64; 2];
-
-/// Change of a logarithm during an arrest that counts as instantaneous, at most. Chosen: below the tightest tolerance.
-const NEGLIGIBLE: f64 = 1e-14;
 
 /// The block on its spring: the evolution law of the state and the four parameters of the scaled equations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,13 +77,13 @@ impl ScaledBlock {
     ///
     /// Where the spring holds the block back, the velocity falls faster than exponentially to the balance of friction and
     /// spring force, `a x = z - b y`, which may be thousands of decades below. This takes at most `M e^x/(a x + b y - z)`.
-    /// The arrest is instantaneous once no other variable changes by more than `NEGLIGIBLE` in this time.
+    /// The arrest is instantaneous once no other variable changes by more than `MIN_STEP_ERROR` in this time.
     pub fn arrest(&self, &[z, y, x]: &State) -> Option<State> {
         let resting = (z - self.b * y) / self.a;
         let pull = self.a * (x - resting);
         let time = self.inertia * exp(x) / pull;
         let rate = self.k / self.force() + exp(-y) + self.slip_rate(y, x);
-        (x > resting + 1.0 && time * rate < NEGLIGIBLE).then_some([z, y, resting])
+        (x > resting + 1.0 && time * rate < MIN_STEP_ERROR).then_some([z, y, resting])
     }
 
     /// First step, in which the state changes little.

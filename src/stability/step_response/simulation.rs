@@ -80,8 +80,7 @@ pub(super) const UNDERFLOW_LN_V: f64 = -1000.0;
 pub(super) fn follow(slider: &ScaledBlock, x: f64, rtol: f64) -> Simulation {
     let linear = LinearStability::of(slider);
     if let Some(long_term) = without_simulation(slider, linear, x) {
-        let unresolved = UnresolvedNumbers::default();
-        return Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, unresolved };
+        return Simulation::known(long_term);
     }
     let settles = settles(slider, linear, x);
     let simulation = simulate(slider, linear, x, rtol, settles);
@@ -166,6 +165,11 @@ fn is_checked(slider: &ScaledBlock, x: f64) -> bool {
 }
 
 impl Simulation {
+    /// A long-term behaviour that takes no simulation.
+    pub fn known(long_term: LongTermBehaviour) -> Simulation {
+        Simulation { long_term, high: None, low: None, t: 0.0, steps: 0, unresolved: UnresolvedNumbers::default() }
+    }
+
     /// Greatest velocity of the transient; `None` if the greatest velocity is only approached.
     pub fn peak(&self, rtol: f64) -> Option<Extremum> {
         let last = if let LongTermBehaviour::Cycle { high, .. } = self.long_term { high } else { 0.0 };

@@ -32,7 +32,7 @@ use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::{Transition, friction_margin};
 use crate::numerics::elementary::{exp, exp_m1, ln_1p, ln_near_1};
 use crate::numerics::root::{Probe, newton};
-use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
+use crate::numerics::{MAX_SQUARABLE, MAX_STEPS, NEGLIGIBLE_LN, ROUNDING_RTOL, TIGHT_RTOL};
 use crate::protocol::optimal::acceleration_time_at_ceiling;
 use crate::protocol::{Motion, SolverStats};
 use motion::BoundedFrictionMotion;
@@ -98,13 +98,10 @@ const MAX_ERROR_GROWTH: f64 = 1e3;
 const LOW_NOISE: f64 = 1e-11;
 const MAX_NOISE: f64 = 1e-9;
 
-/// Loosest accuracy of a solution. Measured: a looser one saves no time, and a few searches fail.
-const LOOSEST_RTOL: f64 = 1e-4;
-
 /// The path of the member that solves the case, and its panels.
 fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPath, Vec<FrictionPanel>), Obstacle> {
     let Transition { law, v_i, v_f } = case.transition;
-    let (t_f, rtol) = (case.t_f, rtol.min(LOOSEST_RTOL));
+    let (t_f, rtol) = (case.t_f, rtol.min(SEARCH_TOLERANCE));
     if case.tau_ceiling.is_nan() {
         return Err(Obstacle::Domain);
     }
@@ -184,19 +181,13 @@ fn paths(by_theta: FrictionPath, case: &Case, spare: f64, log_ratio: f64) -> Vec
 /// Tolerance at the nodes of the last pass, in units of `rtol`. Chosen: the rest is left for the other errors of the row.
 const LAST_PASS_FRACTION: f64 = 0.1;
 
-/// Tolerance at the nodes, at least: rounding. Chosen: nine hundred roundings of 1.1e-16, the noise of a long path.
-const MIN_TOLERANCE: f64 = 1e-13;
-
-/// Relative error of the target from rounding of `w`, at most. Chosen: a few operations of one rounding each.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
-
 /// The pass that gives the work too, and the extremes, which lie between the nodes; `expected` is about the work.
 fn last_pass(
     path: &FrictionPath,
     (rtol, tolerance, expected): (f64, f64, f64),
     stats: &mut SolverStats,
 ) -> Result<(PassResult, Vec<FrictionPanel>), PassFailure> {
-    let accuracy = (LAST_PASS_FRACTION * rtol).max(MIN_TOLERANCE);
+    let accuracy = (LAST_PASS_FRACTION * rtol).max(TIGHT_RTOL);
     // A velocity carries the error of `ln theta` b/a times.
     let nodes = accuracy / (1.0 + path.ratio);
     let inside = nodes * nodes.sqrt() * (1.0 + path.ratio);
@@ -228,12 +219,12 @@ fn refine(mut path: FrictionPath, (rtol, max_noise): (f64, f64), stats: &mut Sol
         // Newton's method has converged to rounding. Where neighbouring doubles differ by more, another residual may be
         // better conditioned.
         let are_neighbours = step.abs() <= f64::EPSILON * path.alpha.abs();
-        let spent = step.abs() <= ROUNDING * path.rounding(&end) && step.abs() >= 0.5 * before
+        let spent = step.abs() <= 2.0 * ROUNDING_RTOL * path.rounding(&end) && step.abs() >= 0.5 * before
             || are_neighbours && within(0.5 * LOW_NOISE)
             || path.alpha + step == path.alpha;
         // Slips that add up to the spare time are known to its rounding. Theta at the end may determine alpha better. The
         // rounding of t_f itself limits every residual.
-        let is_lost = is_last && ROUNDING * path.lost_in_sum(&end) > 0.5 * rtol.max(LOW_NOISE) * scale;
+        let is_lost = is_last && 2.0 * ROUNDING_RTOL * path.lost_in_sum(&end) > 0.5 * rtol.max(LOW_NOISE) * scale;
         if end.noise * f64::EPSILON > max_noise || is_lost {
             return None;
         }
@@ -259,7 +250,7 @@ fn refine(mut path: FrictionPath, (rtol, max_noise): (f64, f64), stats: &mut Sol
     None
 }
 
-/// Tolerance of the passes of the search. Chosen; the budgets of `shortcut` judge it.
+/// Tolerance of the passes of the search, and loosest accuracy of a solution. Measured: a looser one saves no time, and a few searches fail.
 const SEARCH_TOLERANCE: f64 = 1e-4;
 
 /// Relative change of `alpha_3` that ends the search, and of some velocity in the last step, at most. Chosen: from three digits Newton's method takes
@@ -271,9 +262,6 @@ const RESIDUAL_WEIGHT: f64 = 0.1;
 
 /// Step of the search, in units of [`FrictionPath::alpha_scale`] and of `1 + alpha_3`, at most. Chosen; the budgets of `shortcut` judge it.
 const MAX_SEARCH_STEP: f64 = 4.0;
-
-/// `asinh` of `alpha_3` in units of [`FrictionPath::alpha_scale`], at most. Chosen; the budgets of `shortcut` judge it.
-const MAX_ASINH_ALPHA: f64 = 100.0;
 
 /// `alpha_3` to [`SEARCH_TOLERANCE`], by Newton's method; `None` where it fails, or where errors grow too much.
 ///
@@ -315,8 +303,8 @@ fn search(path: &FrictionPath, max_growth: f64, stats: &mut SolverStats) -> Opti
     let far = ln_1p(4.0 * path.t_f / path.spare);
     let (start, most) = match path.residual {
         Residual::LnTheta => (0.0, f64::INFINITY),
-        Residual::Slip | Residual::TwoSidedSlip => (far, MAX_ASINH_ALPHA),
-        Residual::TimeLoss => (-far, MAX_ASINH_ALPHA),
+        Residual::Slip | Residual::TwoSidedSlip => (far, NEGLIGIBLE_LN),
+        Residual::TimeLoss => (-far, NEGLIGIBLE_LN),
     };
     let root = newton(probe, start, (-most, most), false, NEWTON_CHANGE)?;
     (!gave_up && errors <= max_growth).then(|| alpha_at(root.x))

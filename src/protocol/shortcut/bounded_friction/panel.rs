@@ -49,13 +49,17 @@ impl FrictionPanel {
 
     /// `w` there.
     pub fn level(&self, s: f64) -> f64 {
-        radau().interpolate(self.start, &self.w, s)
+        radau().interpolate(Some(self.start), &self.w, s)
     }
 
     /// `w` and `z` there.
     pub fn state(&self, path: &FrictionPath, s: f64) -> (f64, f64) {
         let w = self.level(s);
-        let z = if self.follows { radau().follow(&self.z, s) } else { path.ln_theta_v(self.side, self.distance(s), w) };
+        let z = if self.follows {
+            radau().interpolate(None, &self.z, s)
+        } else {
+            path.ln_theta_v(self.side, self.distance(s), w)
+        };
         (w, z)
     }
 }

@@ -11,9 +11,9 @@
 
 use super::panel::{FrictionPanel, collocate};
 use crate::model::Transition;
-use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
+use crate::numerics::{MAX_PANELS, NEGLIGIBLE_LN};
 use crate::protocol::SolverStats;
 use crate::protocol::shortcut::Case;
 
@@ -126,9 +126,6 @@ const UNDERFLOW_LN_V: f64 = 800.0;
 
 /// Exponent of `tau_M - tau`, at most: it stays within the range of a double. Chosen: `e^400` is 5e173.
 pub(super) const MAX_EXPONENT: f64 = 400.0;
-
-/// Panels of one pass, at most. Chosen: far more than a path that arrives takes.
-const MAX_PANELS: usize = 4000;
 
 impl FrictionPath {
     pub fn new(case: &Case, margins: (f64, f64), ln_r: f64, log_ratio: f64) -> FrictionPath {

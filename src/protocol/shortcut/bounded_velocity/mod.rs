@@ -15,10 +15,9 @@ mod parabola;
 
 use super::{Case, Family, Obstacle, Shortcut};
 use crate::model::Transition;
-use crate::numerics::elementary::ln;
+use crate::numerics::elementary::{ln, ln_near_1};
 use crate::protocol::profile::{
     self, ArrivalProblem, InitialState, ProtocolEnd, ResolvedPanel, ResolvedProfile, WorkAndFriction, integrate_theta,
-    ln_of_ratio,
 };
 use crate::protocol::{Motion, SolverStats};
 use parabola::Parabola;
@@ -116,7 +115,7 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<Curve, Obst
         return Err(Obstacle::Time { t_min });
     }
     let (w_i, w_f) = (v_i - 1.0, v_f - 1.0);
-    let l = ln_of_ratio(w_i, w_f, v_f - v_i);
+    let l = ln_near_1((v_f - v_i) / w_i, w_f / w_i);
     // Near v = 1, theta depends on values of v - 1 of the size of that at the end.
     let curve = Curve::new(1.0, w_f, t_f, Parabola { l, c: 0.0 }).resolved_to(w_f);
     if v_i == v_f {

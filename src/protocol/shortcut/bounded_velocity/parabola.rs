@@ -1,6 +1,6 @@
 //! Exponent of `bounded_velocity`: the parabola `f = -z (L + c x)`.
 
-use crate::protocol::profile::{CurvePanel, Exponent, PanelRanges, ProtocolEnd};
+use crate::protocol::profile::Exponent;
 
 /// The parabolic exponent.
 #[derive(Debug, Clone, Copy)]
@@ -56,35 +56,5 @@ impl Exponent for Parabola {
 
     fn newton_step(ratio: f64) -> f64 {
         1.0 - 1.0 / ratio
-    }
-
-    fn has_minimum(&self) -> bool {
-        self.c > 0.0
-    }
-
-    /// The ranges meet at the bottom of a deep minimum, else in the middle; a negligible part is a range of its own.
-    fn panel_ranges(&self, level: f64, depth: f64) -> PanelRanges {
-        let bottom = self.vertex().filter(|x| self.c > 0.0 && (0.25..=0.75).contains(x));
-        let x = bottom.unwrap_or(0.5);
-        let is_negligible = self.c > 0.0 && level + self.value(x, 1.0 - x) < depth;
-        let crossing = |rise: f64, slope: f64, end: f64| {
-            // Nearer root of e0 + slope d + c d^2 = depth, written without cancellation; slope < 0.
-            let fall = end - depth;
-            let d = 2.0 * fall / (-slope + (slope * slope - 4.0 * self.c * fall).max(0.0).sqrt());
-            if fall > 0.0 && d < rise { d } else { 0.0 }
-        };
-        let whole = |side, meeting| {
-            [CurvePanel { side, from: 0.0, to: meeting }, CurvePanel { side, from: meeting, to: meeting }]
-        };
-        let parts = |side, meeting: f64, slope: f64, end: f64| {
-            if !is_negligible {
-                return whole(side, meeting);
-            }
-            let d = crossing(meeting, slope, end);
-            [CurvePanel { side, from: 0.0, to: d }, CurvePanel { side, from: d, to: meeting }]
-        };
-        let [first, second] = parts(ProtocolEnd::Start, x, self.l - self.c, level + self.value(0.0, 1.0));
-        let [fourth, third] = parts(ProtocolEnd::End, 1.0 - x, -(self.l + self.c), level);
-        PanelRanges { panels: [first, second, third.reversed(), fourth.reversed()] }
     }
 }
