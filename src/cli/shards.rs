@@ -123,19 +123,11 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     fs::create_dir_all(&arguments.out).map_err(|error| cannot_write(&arguments.out, &error))?;
     let program = std::env::current_exe()
         .map_err(|error| Failure::failed(format!("cannot find the path of the running program: {error}")))?;
-    let job = Job {
-        name: &sweep.name,
-        program: quoted(&program),
-        spec: quoted(&absolute(&arguments.spec)?),
-        out: quoted(&out),
-        dataset: quoted(folder.path()),
-        log: script.with_extension(""),
-        shards,
-        cpus: arguments.cpus,
-        each,
-    };
-    to_file(&script, |file| file.write_all(job.script(engine).as_bytes()))
-        .map_err(|error| cannot_write(&script, &error))?;
+    let spec = absolute(&arguments.spec)?;
+    let paths = [program.as_path(), &spec, &out, folder.path()].map(quoted);
+    let size = (shards, arguments.cpus, each);
+    let text = script_of(engine, &sweep.name, &script.with_extension(""), size, paths);
+    to_file(&script, |file| file.write_all(text.as_bytes())).map_err(|error| cannot_write(&script, &error))?;
 
     let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
     let (tasks, cpus) = (words::things(shards, "task"), words::things(arguments.cpus, "processor"));
@@ -194,52 +186,42 @@ fn slurm_config(key: &str) -> Option<String> {
     })
 }
 
-/// The values of a job script; paths are quoted for the shell.
-struct Job<'a> {
-    name: &'a str,
-    program: String,
-    spec: String,
-    out: String,
-    dataset: String,
-    log: PathBuf,
-    shards: u64,
-    cpus: u64,
-    /// Predicted time of a task, in s.
-    each: f64,
-}
-
-impl Job<'_> {
-    /// The script for a scheduler.
-    fn script(&self, engine: Engine) -> String {
-        let Job { name, program, spec, out, dataset, shards, cpus, .. } = self;
-        let (last, about) = (shards - 1, words::duration(self.each));
-        // Predictions come from a small sample, and other machines may be slower.
-        let minutes = (10.0 + 3.0 * self.each / 60.0).ceil();
-        // Slurm interprets % as a pattern.
-        let log = self.log.display().to_string().replace('%', "%%").replace('"', "\\\"");
-        let task = format!(
-            "# A task is about {about} of work. It may be killed, repeated, or run twice at the same time without harm."
-        );
-        let (head, again, number) = match engine {
-            Engine::Slurm => (
-                format!(
-                    "#SBATCH --job-name={name}\n#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={cpus}\n#SBATCH --time={minutes}\n\
+/// The job script for a scheduler: the number of its tasks, their processors and the predicted time of each in s, and the quoted paths of program, spec,
+/// output and dataset.
+fn script_of(
+    engine: Engine,
+    name: &str,
+    log: &Path,
+    (shards, cpus, each): (u64, u64, f64),
+    [program, spec, out, dataset]: [String; 4],
+) -> String {
+    let (last, about) = (shards - 1, words::duration(each));
+    // Predictions come from a small sample, and other machines may be slower.
+    let minutes = (10.0 + 3.0 * each / 60.0).ceil();
+    // Slurm interprets % as a pattern.
+    let log = log.display().to_string().replace('%', "%%").replace('"', "\\\"");
+    let task = format!(
+        "# A task is about {about} of work. It may be killed, repeated, or run twice at the same time without harm."
+    );
+    let (head, again, number) = match engine {
+        Engine::Slurm => (
+            format!(
+                "#SBATCH --job-name={name}\n#SBATCH --array=0-{last}\n#SBATCH --cpus-per-task={cpus}\n#SBATCH --time={minutes}\n\
                      #SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --output=\"{log}-%a.log\"\n"
-                ),
-                "# Exit code 75 requeues the task, at most five times, if it is in RequeueExit of Slurm.\n\
+            ),
+            "# Exit code 75 requeues the task, at most five times, if it is in RequeueExit of Slurm.\n\
                  again=--requeue\n\
                  [ \"${SLURM_RESTART_COUNT:-0}\" -lt 5 ] || again=\n",
-                ("$SLURM_ARRAY_TASK_ID", " $again"),
-            ),
-            Engine::Hyperqueue => {
-                (format!("#HQ --name={name}\n#HQ --array=0-{last}\n#HQ --cpus={cpus}\n"), "", ("$HQ_TASK_ID", ""))
-            }
-        };
-        let (number, flag) = number;
-        format!(
-            "#!/bin/bash\n{head}{SHARDS}{shards}\n{task}\n{again}\
+            ("$SLURM_ARRAY_TASK_ID", " $again"),
+        ),
+        Engine::Hyperqueue => {
+            (format!("#HQ --name={name}\n#HQ --array=0-{last}\n#HQ --cpus={cpus}\n"), "", ("$HQ_TASK_ID", ""))
+        }
+    };
+    let (number, flag) = number;
+    format!(
+        "#!/bin/bash\n{head}{SHARDS}{shards}\n{task}\n{again}\
              exec {program} run {spec} --out {out} --shard \"{number}/{shards}\" --threads {cpus}{flag}\n\
              # Missing parts: {program} status {dataset}\n"
-        )
-    }
+    )
 }

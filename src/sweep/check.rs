@@ -69,6 +69,9 @@ pub struct Request {
 
 /// Help for a path that cannot be read: the dataset of this name, or the nearest name with this ending in the same folder, if any.
 pub fn path_hint(path: &Path, ending: &str) -> String {
+    if path == Path::new("-") {
+        return "standard input is not read: write it to a file".to_owned();
+    }
     let dataset = Path::new("results").join(path);
     if ending.is_empty() && dataset.is_dir() {
         return format!("did you mean `{}`?", dataset.display());

@@ -89,14 +89,18 @@ impl Estimates {
 /// Threads that cannot be started, and cells that cannot be encoded.
 pub fn estimate(sweep: &Sweep, folder: &Path) -> Result<Estimates, RunError> {
     let (plan, pool) = (Plan::new(sweep), pool(0)?);
-    let sampler =
-        CostSampler { sweep, plan: &plan, manifest: plan.manifest(sweep), pool: &pool, began: Instant::now() };
+    let (manifest, began) = (plan.manifest(sweep), Instant::now());
     let samples = sweep.requests.len() as u32 + u32::from(plan.optima > 0);
     let budget = SAMPLE_TIME.as_secs_f64() / f64::from(samples);
-    let optimum = sampler.optimum(budget);
-    let optima = sweep.optimum_cache();
-    let tables =
-        sweep.requests.iter().zip(&optima).map(|(request, optima)| sampler.table(request, optima, optimum, budget));
+    let optimum = optimum_cost(sweep, &plan, &pool, budget);
+    let (optima, signal) = (sweep.optimum_cache(), Signal::default());
+    let tables = sweep.requests.iter().zip(&optima).map(|(request, optima)| {
+        let job = sweep.job(request, optima, &signal);
+        let layout = Layout::new(request.table, &request.projection, &sweep.grid);
+        let (pool, manifest, all_began) = (&pool, &manifest, began);
+        TableSampler { request, job, layout, pool, manifest, optimum, all_began, began: Instant::now(), budget }
+            .estimate()
+    });
     let tables: Vec<Estimate> = tables.collect::<Result<_, _>>()?;
     let parts: u64 = plan.tables.iter().map(|table| table.parts).sum();
     let bytes = tables.iter().map(|table| table.bytes).sum::<f64>() / parts as f64;
@@ -168,64 +172,40 @@ impl LinearCost {
     }
 }
 
-/// Computes samples of the tables of a sweep.
-struct CostSampler<'a> {
-    sweep: &'a Sweep,
-    plan: &'a Plan,
-    manifest: Manifest,
-    pool: &'a ThreadPool,
-    began: Instant,
-}
-
-impl CostSampler<'_> {
-    /// The cost of a table if a shared optimal protocol costs `optimum`, from samples that take about `budget` seconds, more if rows differ.
-    fn table(&self, request: &Request, optima: &OptimumCache, optimum: f64, budget: f64) -> Result<Estimate, RunError> {
-        let signal = Signal::default();
-        let table = TableSampler {
-            sampler: self,
-            request,
-            job: self.sweep.job(request, optima, &signal),
-            layout: Layout::new(request.table, &request.projection, &self.sweep.grid),
-            optimum,
-            began: Instant::now(),
-            budget,
-        };
-        table.estimate()
-    }
-
-    /// Seconds of one thread for an optimal protocol shared by tables; 0 if there is none.
-    fn optimum(&self, budget: f64) -> f64 {
-        let Some(rows) = self.sweep.optimum_rows.as_ref().filter(|_| self.plan.optima <= OptimumCache::MAX_CACHED)
-        else {
-            return 0.0;
-        };
-        let Sweep { bounded, friction, .. } = *self.sweep;
-        let rtol = self.sweep.optimum_rtol();
-        let solve = |point: &Point| _ = uncapped_optimum(point, bounded, friction, rtol);
-        let (began, mut places) = (Instant::now(), rows.rows().min(MIN_RANGES));
-        loop {
-            let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);
-            let points: Vec<Point> = starts.map(|row| self.sweep.grid.scaled(&rows.point(row))).collect();
-            let start = Instant::now();
-            self.pool.install(|| points.par_iter().for_each(solve));
-            let each = start.elapsed().as_secs_f64() * self.pool.current_num_threads() as f64 / places as f64;
-            let most = rows.rows().min(MAX_OPTIMA);
-            if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {
-                return each;
-            }
-            places = (8 * places).min(most);
+/// Seconds of one thread for an optimal protocol shared by tables; 0 if there is none.
+fn optimum_cost(sweep: &Sweep, plan: &Plan, pool: &ThreadPool, budget: f64) -> f64 {
+    let Some(rows) = sweep.optimum_rows.as_ref().filter(|_| plan.optima <= OptimumCache::MAX_CACHED) else {
+        return 0.0;
+    };
+    let Sweep { bounded, friction, .. } = *sweep;
+    let rtol = sweep.optimum_rtol();
+    let solve = |point: &Point| _ = uncapped_optimum(point, bounded, friction, rtol);
+    let (began, mut places) = (Instant::now(), rows.rows().min(MIN_RANGES));
+    loop {
+        let starts = (0..places).map(|place| place_of(rows.rows(), place, 1).start);
+        let points: Vec<Point> = starts.map(|row| sweep.grid.scaled(&rows.point(row))).collect();
+        let start = Instant::now();
+        pool.install(|| points.par_iter().for_each(solve));
+        let each = start.elapsed().as_secs_f64() * pool.current_num_threads() as f64 / places as f64;
+        let most = rows.rows().min(MAX_OPTIMA);
+        if places == most || began.elapsed().as_secs_f64() > 0.2 * budget {
+            return each;
         }
+        places = (8 * places).min(most);
     }
 }
 
 /// Samples one table.
 struct TableSampler<'a> {
-    sampler: &'a CostSampler<'a>,
     request: &'a Request,
     job: Job<'a>,
     layout: Layout,
+    pool: &'a ThreadPool,
+    manifest: &'a Manifest,
     /// Seconds of an optimal protocol of several tables, which are counted apart.
     optimum: f64,
+    /// When the samples of all tables began.
+    all_began: Instant,
     began: Instant,
     /// Seconds for the samples.
     budget: f64,
@@ -246,7 +226,7 @@ impl TableSampler<'_> {
         }
         let (length, sample) = shortest(&samples).unwrap_or((*longest, *long));
         let all = self.extended(sample, length, rows / length, |sample| {
-            let is_late = self.sampler.began.elapsed().as_secs_f64() > MAX_SAMPLE_SECONDS;
+            let is_late = self.all_began.elapsed().as_secs_f64() > MAX_SAMPLE_SECONDS;
             self.elapsed() > self.budget && (is_late || sample.standard_error(rows) < MAX_STANDARD_ERROR)
         })?;
         let [all_time, all_size, of_all] = all.mean();
@@ -261,7 +241,7 @@ impl TableSampler<'_> {
         let parts = rows.div_ceil(self.request.table.rows_per_part());
         // Rows are compressed together: whole parts tell their size, where they are cheap.
         let (part, places) = (rows.min(self.request.table.rows_per_part()), parts.min(MIN_RANGES));
-        let threads = self.sampler.pool.current_num_threads() as f64;
+        let threads = self.pool.current_num_threads() as f64;
         if seconds.of(places, places * part) < 0.5 * threads * self.budget {
             let [_, size, of_part] = self.extended(CostSample::default(), part, places, |_| false)?.mean();
             bytes = LinearCost { range: 0.0, row: size / of_part };
@@ -273,7 +253,7 @@ impl TableSampler<'_> {
     /// most of the time. A single row may overestimate the cost a thousandfold.
     fn lengths(&self) -> Result<Vec<(u64, CostSample)>, RunError> {
         let Request { table, rows, .. } = self.request;
-        let threads = self.sampler.pool.current_num_threads() as u64;
+        let threads = self.pool.current_num_threads() as u64;
         // Expensive rows leave time for few ranges.
         let few = self.extended(CostSample::default(), 1, threads.min(*rows), |_| false)?;
         let is_cheap = self.elapsed() < 0.02 * self.budget;
@@ -314,7 +294,7 @@ impl TableSampler<'_> {
         is_enough: impl Fn(&CostSample) -> bool + Sync,
     ) -> Result<CostSample, RunError> {
         let (next, result) = (AtomicU64::new(sample.ranges), Mutex::new(Ok(sample)));
-        self.sampler.pool.broadcast(|_| {
+        self.pool.broadcast(|_| {
             loop {
                 let place = next.fetch_add(1, Ordering::Relaxed);
                 let is_over = locked(&result).as_ref().map_or(true, |sample| sample.ranges > 0 && is_enough(sample));
@@ -340,7 +320,7 @@ impl TableSampler<'_> {
         let mut buffer = ColumnBuffer::new(request.projection.indices().len());
         buffer.resize((rows.end - rows.start) as usize);
         let work = request.table.compute(job, rows.clone(), &mut buffer)?;
-        let footer = Footer::new(&self.sampler.manifest, request.table.name(), rows.clone());
+        let footer = Footer::new(self.manifest, request.table.name(), rows.clone());
         let (bytes, _) = encode(&self.layout, job.rows, &buffer, &footer).map_err(DatasetError::Sample)?;
         let optima = if *optimum > 0.0 { work.optima } else { 0 };
         let seconds = start.elapsed().as_secs_f64() - optima as f64 * optimum;

@@ -74,8 +74,7 @@ fn unknown_axis(path: &Path, name: &str) -> SpecError {
             format!("`{bare}` goes below [model]; samples that differ in it need a spec each")
         }
         _ if error.help.starts_with("did you mean") => error.help.to_string(),
-        _ => "remove it; a label of numbers needs letters, as in S1, or quotes, which Parquet does not need for text"
-            .to_owned(),
+        _ => "remove it, or make it a label: text, in CSV with a letter or in quotes".to_owned(),
     };
     let expected = format!("{}; or a label: text, such as \"S1\", or numbers in quotes", error.expected);
     let found = format!("{}: unknown axis `{name}`", path.display());

@@ -109,7 +109,7 @@ fn doubtful_axes_and_scales() {
     let output = slipsweep(&["plan", "si.toml"], folder.path());
     let warnings = String::from_utf8_lossy(&output.stderr);
     for expected in [
-        "si.toml:5: model.l: 20.0 is unusual\n  expected: usually 0.0 to 1.0, in m",
+        "si.toml:5: model.l: 20.0 is unusual\n  expected: usually at most 1.0 m",
         "si.toml:4: model.mu_0: 60.0 is unusual",
         "si.toml:7: model.normal_stress: 25.0 is unusual",
         "si.toml:14: axes.v_ceiling: 500.0 m/s is unusually fast",

@@ -297,7 +297,11 @@ impl Arguments {
         let missing: Vec<Quantity> = missing.into_iter().map(|(quantity, _)| quantity).filter(is_needed).collect();
         if !missing.is_empty() {
             let flags: Vec<String> = missing.into_iter().map(flag).collect();
-            return Err(wrong(format!("`{name}` needs {}", flags.join(", "))));
+            let found = format!("`{name}` needs {}", flags.join(", "));
+            return Err(wrong(format!(
+                "{found}\n  help: add {}, or name a dataset and a row",
+                if flags.len() > 1 { "them" } else { "it" }
+            )));
         }
         match given.into_iter().find(|(quantity, _)| !heeded.contains(quantity)) {
             Some((quantity, _)) => {
