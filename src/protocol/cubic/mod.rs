@@ -295,7 +295,7 @@ impl Evaluation<'_> {
     #[inline(always)]
     fn velocities(&mut self, first: usize, a_2: &Lanes, a_3: &Lanes, found: &[Status; LANES]) {
         let mut least = [0.0; LANES];
-        let Some(wanted) = self.v_min.get_mut(first..) else { return };
+        let Some(wanted) = self.v_min.get_mut(first..).filter(|wanted| !wanted.is_empty()) else { return };
         let left = end_velocities(&self.of.ends, a_2, a_3, found, &mut least);
         for ((v_min, least), found) in wanted.iter_mut().zip(least).zip(found) {
             *v_min = if *found == Status::Infeasible { *v_min } else { least };

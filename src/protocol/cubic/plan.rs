@@ -9,8 +9,8 @@ use multiversion::multiversion;
 use super::bins::BINS;
 use super::path::{Ends, Path};
 use super::rules::{
-    MAX_CHEAP_NODES, MAX_ZERO_DISTANCE, MIN_THIRD, NODE_STEP, NodeThresholds, THETA_ZEROS, ZEROS, cut, is_near_start,
-    polished, rough_zeros,
+    MAX_CHEAP_NODES, MAX_ZERO_DISTANCE, MIN_THETA_PAIR, NODE_STEP, NodeThresholds, THETA_ZEROS, ZEROS, cut,
+    is_near_start, polished, rough_zeros,
 };
 use super::{PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::lanes::LANES;
@@ -174,7 +174,7 @@ impl<T: Real> Places<T> {
     fn mark_close_pairs(&mut self) {
         let Places { re, im, doubt } = self;
         for k in 0..ZEROS {
-            let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THIRD } else { MIN_PAIR });
+            let least = T::of(if k < THETA_ZEROS || is_coarse::<T>() { MIN_THETA_PAIR } else { MIN_PAIR });
             for i in 0..SPAN_SHORTCUTS {
                 let close = (re[k][i] > T::of(0.0)) & (re[k][i] < T::of(1.0)) & (im[k][i] < least);
                 doubt[i] += if close { 1.0 } else { 0.0 };

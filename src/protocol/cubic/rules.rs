@@ -245,8 +245,8 @@ impl Zeros {
     }
 }
 
-/// Least distance of the third zero from a close pair. Derived: the error of the closed form is below half of this.
-pub(super) const MIN_THIRD: f64 = 0.03;
+/// Least half distance of a pair of zeros of theta that is known to some digits. Derived: the error of the closed form is below half of this.
+pub(super) const MIN_THETA_PAIR: f64 = 0.03;
 
 /// Appends the panels that integrate over `[low, high]`.
 pub(super) fn choose(
