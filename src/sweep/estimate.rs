@@ -239,7 +239,7 @@ impl TableSampler<'_> {
             }
         }
         let parts = rows.div_ceil(self.request.table.rows_per_part());
-        // Rows are compressed together: whole parts tell their size, where they are cheap.
+        // Rows are compressed together: whole parts give their size, where they are cheap.
         let (part, places) = (rows.min(self.request.table.rows_per_part()), parts.min(MIN_RANGES));
         let threads = self.pool.current_num_threads() as f64;
         if seconds.of(places, places * part) < 0.5 * threads * self.budget {
