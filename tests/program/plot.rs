@@ -684,6 +684,41 @@ fn labelled_points_are_dots_or_panels() {
     assert_eq!(words.lines().filter(|line| line.starts_with('m')).count(), 9, "{words}");
 }
 
+/// Dots have a symbol for each value of a label, of which several points may share one or have none, or of an axis of their points.
+#[test]
+fn dots_have_a_symbol_for_each_value_of_their_colour() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let points =
+        "sample,rock,a,b\ns1,granite,0.010,0.015\ns2,granite,0.010,0.012\ns3,gabbro,0.020,0.011\ns4,,0.020,0.018\n";
+    fs::write(folder.join("points.csv"), points).expect("is writable");
+    // The rocks alone do not determine the points.
+    let rocks: Vec<String> = points.lines().filter_map(|line| Some(format!("{}\n", line.split_once(',')?.1))).collect();
+    fs::write(folder.join("rocks.csv"), rocks.concat()).expect("is writable");
+    for (name, has_names) in [("points", true), ("rocks", false)] {
+        let spec = format!(
+            "name = \"{name}\"\npoints = \"{name}.csv\"\n[axes]\nt_f = 0.02\nv_i = 3.0\nv_f = 100.0\n[tables.optimal]\n"
+        );
+        fs::write(folder.join("spec.toml"), spec).expect("is writable");
+        shown(folder, &["run", "spec.toml", "--quiet"]);
+        let dataset = format!("results/{name}");
+        let plot = ["plot", &dataset, "--table", "optimal", "--x", "b", "--y", "work", "--out", "drawn.svg", "--color"];
+        for (colour, legend) in
+            [("rock", &["granite", "gabbro", "no rock"][..]), ("a", &["a = 0.01 μ0", "a = 0.02 μ0"])]
+        {
+            shown(folder, &[&plot[..], &[colour]].concat());
+            let words = words(&read(folder, "drawn.svg"));
+            for text in legend {
+                assert_eq!(words.lines().filter(|line| line == text).count(), 1, "{name} {colour} {text}: {words}");
+            }
+            assert!(!words.contains(" are shown."), "{words}");
+            assert_eq!(words.lines().any(|line| line == "s3"), has_names, "{words}");
+        }
+    }
+    let plot = ["plot", "results/points", "--table", "optimal", "--x", "a", "--y", "work"];
+    assert!(shown(folder, &[&plot[..], &["--color", "sample", "--out", "drawn.svg"]].concat()).contains("drawn.svg"));
+}
+
 /// Groups without values take no place of those with values.
 #[test]
 fn groups_with_values_are_preferred() {

@@ -48,7 +48,10 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     let colour = colour.filter(|colour| y.is_none() || !filtered.is_label(colour));
     let wants_map = colour.filter(|colour| !is_axis(colour));
     let wants_lines = y.is_some() || colour.is_some_and(|colour| is_axis(&colour));
-    if !wants_lines && let Some((x, y)) = choice.two_axes(wants_map.is_some())? {
+    // A label colours a map of points, not one of a grid.
+    let is_of_label = colour.is_some_and(|colour| filtered.is_label(colour));
+    let shows_label = |x: &str, y: &str| !is_of_label || [x, y].iter().all(|axis| filtered.is_of_dot(axis));
+    if !wants_lines && let Some((x, y)) = choice.two_axes(wants_map.is_some())?.filter(|(x, y)| shows_label(x, y)) {
         return choice.map(x, y);
     }
     if let Some(column) = wants_map.filter(|column| !filtered.is_label(column)) {
@@ -77,7 +80,7 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
-    if let Some(colour) = request.colour.as_deref().filter(|_| filtered.is_of_point(&x))
+    if let Some(colour) = request.colour.as_deref().filter(|_| filtered.is_of_dot(&x))
         && choice.has_symbols(&x, colour, y.first())?
     {
         return Ok(Shape::Lines(lines::LineColumns { x, y, series: Some(colour.to_owned()), has_symbols: true }));
@@ -148,7 +151,9 @@ impl<'a> Choice<'a> {
         if filtered.is_label(colour) {
             return Ok((2..=MAX_SERIES).contains(&filtered.words(colour).len()));
         }
-        let Some(axis) = filtered.axis(colour).filter(|axis| filtered.is_of_point(&axis.name) && colour != x) else {
+        let Some(axis) =
+            filtered.axis(colour).filter(|axis| axis.varies() && filtered.is_of_dot(colour) && colour != x)
+        else {
             return Ok(false);
         };
         if axis.values.len() <= MAX_SERIES {

@@ -21,6 +21,9 @@ use crate::table::{self, Kind, STATUS};
 /// megabytes.
 const MAX_VALUES: usize = 100_000;
 
+/// Greatest number of words of a label that names dots. Chosen: more names overlap.
+const MAX_NAMES: usize = 60;
+
 /// Greatest number of distinct labels of a column; columns with more are ignored. Chosen: more are not readable in a picture.
 const MAX_LABELS: usize = 1000;
 
@@ -245,6 +248,11 @@ impl FilteredTable {
         self.of_points.iter().any(|name| name == axis)
     }
 
+    /// Whether rows are dots over an axis: it is one of labelled points, or of a file of points.
+    pub fn is_of_dot(&self, axis: &str) -> bool {
+        self.is_of_point(axis) || self.gridded.is_from_file(axis)
+    }
+
     /// Whether a column is a label.
     pub fn is_label(&self, column: &str) -> bool {
         let common = self.common_labels.iter().map(|(name, _)| name);
@@ -282,7 +290,7 @@ impl FilteredTable {
         Some(label::literal(words.get(cell as usize).filter(|_| !cell.is_nan())?))
     }
 
-    /// The labels that name a dot: one that determines all others, if there is one; without the label in the legend.
+    /// The labels that name a dot: one that determines all others, if there is one; without the label in the legend, and none with too many words.
     pub fn names_of_dots(&self, legend: Option<&str>) -> Result<Vec<&str>, PlotError> {
         let mut names = self.label_columns();
         for label in self.label_columns() {
@@ -292,7 +300,8 @@ impl FilteredTable {
             }
         }
         names.retain(|name| Some(*name) != legend);
-        Ok(names)
+        let is_crowded = names.iter().any(|name| self.words(name).len() > MAX_NAMES);
+        Ok(if is_crowded { Vec::new() } else { names })
     }
 
     /// Drops all labels but `name`, if it is one that varies.

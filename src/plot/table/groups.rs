@@ -21,8 +21,12 @@ const MAX_PANELS: usize = 9;
 const MAX_CROSSED_PANELS: usize = 4;
 
 /// The varying axes that are not drawn and that distinguish rows, and a note on axes that change only with them. A grid axis always
-/// distinguishes rows. Over an axis of labelled points, the label distinguishes rows, not the other axes of these points.
-pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
+/// distinguishes rows. Over an axis of labelled points, the label distinguishes rows, not the other axes of these points; nor do these distinguish symbols.
+pub fn further<'a>(
+    filtered: &'a FilteredTable,
+    drawn: &[&str],
+    makes: GroupRole,
+) -> Result<(Vec<&'a str>, Option<String>), PlotError> {
     let others =
         filtered.axes.iter().filter(|axis| (axis.varies() || axis.infinite) && !drawn.contains(&axis.name.as_str()));
     let others: Vec<&str> = others.map(|axis| axis.name.as_str()).collect();
@@ -31,7 +35,7 @@ pub fn further<'a>(filtered: &'a FilteredTable, drawn: &[&str]) -> Result<(Vec<&
     let mut determined = filtered.determined(&others, &[drawn, &labels].concat())?.into_iter();
     let is_along = |name: &str, is_determined: bool| {
         let gridded = filtered.axis(name).is_some_and(|axis| axis.varies()) && filtered.gridded.is_free(name, drawn);
-        is_determined && !gridded
+        is_determined && !gridded || makes == GroupRole::Symbols && filtered.gridded.is_from_file(name)
     };
     let (along, further): (Vec<&str>, Vec<&str>) =
         others.into_iter().partition(|name| is_along(name, determined.next().unwrap_or(false)));
@@ -62,6 +66,8 @@ pub struct Gridded {
     axes: Vec<String>,
     /// Axes that change together.
     tied: Vec<Vec<String>>,
+    /// All axes of a spec with a file of points.
+    beside_file: Option<Vec<String>>,
 }
 
 impl Gridded {
@@ -78,6 +84,9 @@ impl Gridded {
             };
             let axes = || part.get("axes").and_then(toml::Value::as_table).into_iter().flatten();
             gridded.axes.extend(axes().filter(|(_, value)| is_range(value)).map(|(name, _)| name.clone()));
+            if part.contains_key("points") {
+                gridded.beside_file.get_or_insert_default().extend(axes().map(|(name, _)| name.clone()));
+            }
             let zipped = part.get("zip").and_then(toml::Value::as_array).into_iter().flatten();
             let names = |zip: &toml::Value| {
                 zip.as_array().into_iter().flatten().filter_map(|name| Some(name.as_str()?.to_owned())).collect()
@@ -95,6 +104,11 @@ impl Gridded {
     /// Whether an axis is a list or a range.
     pub fn has(&self, name: &str) -> bool {
         self.axes.iter().any(|axis| axis == name)
+    }
+
+    /// Whether an axis that varies is a column of the file of points.
+    pub fn is_from_file(&self, name: &str) -> bool {
+        self.beside_file.as_ref().is_some_and(|beside| !beside.iter().any(|axis| axis == name))
     }
 
     /// Whether an axis varies independently of the drawn ones.
@@ -156,6 +170,8 @@ pub enum GroupRole {
     Panels,
     /// A line in each panel. Groups that differ only in the friction ceiling are one for a family that does not depend on it.
     Lines,
+    /// A symbol for dots, whatever the other labels and axes of their points.
+    Symbols,
 }
 
 impl Groups {
@@ -165,7 +181,7 @@ impl Groups {
         drawn: &[&str],
         columns: &[&str],
     ) -> Result<(Groups, Option<String>), PlotError> {
-        let (further, along) = further(filtered, drawn)?;
+        let (further, along) = further(filtered, drawn, GroupRole::Panels)?;
         Ok((Groups::new(filtered, &further, GroupRole::Panels, None, [drawn, columns])?, along))
     }
 
@@ -321,7 +337,11 @@ impl Groups {
     /// The number of shown panels or lines, if some are omitted.
     fn omitted(&self, name: impl Fn(&str) -> String) -> Option<String> {
         (self.left_out > 0).then(|| {
-            let what = if self.makes == GroupRole::Panels { "panels" } else { "lines" };
+            let what = match self.makes {
+                GroupRole::Panels => "panels",
+                GroupRole::Lines => "lines",
+                GroupRole::Symbols => "groups",
+            };
             let names: Vec<String> = self.distinguishing.iter().map(|column| name(column)).collect();
             format!("{} of {} {what} ({})", self.with_value - self.left_out, self.with_value, names.join(", "))
         })
@@ -339,7 +359,7 @@ impl GroupRole {
     /// Sets the friction ceiling to NaN for a family that does not depend on it, so that its rows are one line.
     fn merge(self, axes: &[impl AsRef<str>], values: &mut [f64]) {
         let place =
-            |axis: Quantity| axes.iter().position(|name| self == GroupRole::Lines && name.as_ref() == axis.name());
+            |axis: Quantity| axes.iter().position(|name| self != GroupRole::Panels && name.as_ref() == axis.name());
         let (Some(family), Some(bound)) = (place(Quantity::Family), place(Quantity::FrictionCeiling)) else { return };
         if !FAMILIES.get(values[family] as usize).is_some_and(|family| family.uses_tau_ceiling) {
             values[bound] = f64::NAN;
@@ -358,7 +378,7 @@ fn find(
     if axes.is_empty() {
         return Ok(vec![FoundGroup { values: Vec::new(), label: String::new(), has_value: true }]);
     }
-    let labels = filtered.label_columns();
+    let labels = if makes == GroupRole::Symbols { Vec::new() } else { filtered.label_columns() };
     let columns = [axes, &labels, drawn[0], drawn[1]].concat();
     let mut found: IndexMap<Vec<u64>, (FoundGroup, Vec<u64>)> = IndexMap::new();
     // The axes and labels of the last row, if its group has a value.
@@ -372,7 +392,8 @@ fn find(
         let (at, cells) = cells.split_at(drawn[0].len());
         let mut values = values.to_vec();
         makes.merge(axes, &mut values);
-        let new = |values: Vec<f64>| FoundGroup { values, label: filtered.label_of_group(label), has_value: false };
+        let name = || if label.is_empty() { String::new() } else { filtered.label_of_group(label) };
+        let new = |values: Vec<f64>| FoundGroup { values, label: name(), has_value: false };
         let (group, known) = found.entry(bits(&values)).or_insert_with(|| (new(values), bits(label)));
         if *known != bits(label) {
             group.label.clear();
@@ -419,11 +440,10 @@ fn joined(found: &[FoundGroup], of_points: &[usize]) -> Vec<Vec<f64>> {
 fn in_words(filtered: &FilteredTable, axes: &[impl AsRef<str>], of: &[usize], values: &[f64]) -> Vec<String> {
     let text = |&axis: &usize| {
         let (name, value) = (axes[axis].as_ref(), values[axis]);
-        filtered
-            .axis(name)
-            .filter(|_| !value.is_nan())
-            .map(|axis| axis.text_of(value))
-            .or_else(|| filtered.word_of(name, value))
+        match filtered.axis(name) {
+            Some(axis) => (!value.is_nan()).then(|| axis.text_of(value)),
+            None => Some(filtered.word_of(name, value).unwrap_or_else(|| format!("no {}", label::literal(name)))),
+        }
     };
     of.iter().filter_map(text).collect()
 }

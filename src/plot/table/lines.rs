@@ -14,9 +14,6 @@ use crate::plot::{PlotError, coincide, label};
 /// Greatest number of positions along a line; with more rows, several fall on one position. Chosen: more are invisible in print.
 const MAX_POSITIONS: usize = 4096;
 
-/// Greatest number of rows with names at their points. Chosen: more names overlap.
-pub const MAX_NAMED_ROWS: u64 = 60;
-
 /// Range of a column, relative to its greatest value, below which it is constant. Chosen: the range is rounding.
 pub const CONSTANT_RTOL: f64 = 1e-9;
 
@@ -146,15 +143,15 @@ impl Rows {
             .map(String::as_str)
             .chain(of_symbols.filter(|name| !filtered.is_label(name)))
             .collect();
-        let (mut further, along) = groups::further(filtered, &over)?;
-        let are_scattered = groups::is_scattered(filtered, &plan.x, &further)?;
+        let makes = if plan.has_symbols { GroupRole::Symbols } else { GroupRole::Lines };
+        let (mut further, along) = groups::further(filtered, &over, makes)?;
+        let are_scattered = plan.has_symbols || groups::is_scattered(filtered, &plan.x, &further)?;
         further.extend(of_symbols);
         further.sort_by_key(|name| Some(*name) != series);
         let first = further.first().copied().filter(|name| Some(*name) == series);
         let drawn: Vec<&str> = plan.y.iter().map(String::as_str).collect();
-        let groups = Groups::new(filtered, &further, GroupRole::Lines, first, [&[&plan.x], &drawn])?;
-        let is_named = are_scattered && filtered.rows <= MAX_NAMED_ROWS;
-        let labels = if is_named { filtered.names_of_dots(of_symbols)? } else { Vec::new() };
+        let groups = Groups::new(filtered, &further, makes, first, [&[&plan.x], &drawn])?;
+        let labels = if are_scattered { filtered.names_of_dots(of_symbols)? } else { Vec::new() };
         let cells = AxisCells::new(axis, MAX_POSITIONS);
         let has_row_each = are_scattered && filtered.rows <= MAX_POSITIONS as u64;
         let positions = if has_row_each { Vec::new() } else { cells.middles.clone() };
@@ -172,7 +169,7 @@ impl Rows {
                 place = line.positions.len();
                 line.positions.push(row[0]);
                 line.ranges.iter_mut().for_each(|ranges| ranges.push((f64::NAN, f64::NAN)));
-                line.names.extend(is_named.then(|| filtered.label(&labels, named)));
+                line.names.extend((!labels.is_empty()).then(|| filtered.label(&labels, named)));
             }
             for (ranges, &value) in line.ranges.iter_mut().zip(values) {
                 let (low, high) = ranges[place];

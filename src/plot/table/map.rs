@@ -3,7 +3,7 @@
 use super::cells::AxisCells;
 use super::filtered::{FilteredTable, Values};
 use super::groups::Groups;
-use super::lines::{CONSTANT_RTOL, MAX_NAMED_ROWS};
+use super::lines::CONSTANT_RTOL;
 use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
 use crate::plot::contour::contour;
@@ -181,8 +181,7 @@ impl Raster {
         let empty =
             |_| PanelCells { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
         let mut sheets: Vec<PanelCells> = groups.shown.iter().map(empty).collect();
-        let is_named = self.are_dots && filtered.rows <= MAX_NAMED_ROWS;
-        let labels = if is_named { filtered.names_of_dots(Some(&plan.value))? } else { Vec::new() };
+        let labels = if self.are_dots { filtered.names_of_dots(Some(&plan.value))? } else { Vec::new() };
         let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
         let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
         filtered.each(&wanted, |row| {
