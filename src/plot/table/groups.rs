@@ -67,7 +67,7 @@ pub struct Gridded {
     /// Axes that change together.
     tied: Vec<Vec<String>>,
     /// All axes of a spec with a file of points.
-    beside_file: Option<Vec<String>>,
+    outside_file: Option<Vec<String>>,
 }
 
 impl Gridded {
@@ -85,7 +85,7 @@ impl Gridded {
             let axes = || part.get("axes").and_then(toml::Value::as_table).into_iter().flatten();
             gridded.axes.extend(axes().filter(|(_, value)| is_range(value)).map(|(name, _)| name.clone()));
             if part.contains_key("points") {
-                gridded.beside_file.get_or_insert_default().extend(axes().map(|(name, _)| name.clone()));
+                gridded.outside_file.get_or_insert_default().extend(axes().map(|(name, _)| name.clone()));
             }
             let zipped = part.get("zip").and_then(toml::Value::as_array).into_iter().flatten();
             let names = |zip: &toml::Value| {
@@ -108,7 +108,7 @@ impl Gridded {
 
     /// Whether an axis that varies is a column of the file of points.
     pub fn is_from_file(&self, name: &str) -> bool {
-        self.beside_file.as_ref().is_some_and(|beside| !beside.iter().any(|axis| axis == name))
+        self.outside_file.as_ref().is_some_and(|outside| !outside.iter().any(|axis| axis == name))
     }
 
     /// Whether an axis varies independently of the drawn ones.
