@@ -108,7 +108,9 @@ impl Gridded {
 
     /// Whether an axis that varies is a column of the file of points.
     pub fn is_from_file(&self, name: &str) -> bool {
-        self.outside_file.as_ref().is_some_and(|outside| !outside.iter().any(|axis| axis == name))
+        // An axis of words has all of them by default.
+        let has_words = Quantity::from_name(name).is_some_and(|quantity| !quantity.words().is_empty());
+        !has_words && self.outside_file.as_ref().is_some_and(|outside| !outside.iter().any(|axis| axis == name))
     }
 
     /// Whether an axis varies independently of the drawn ones.
