@@ -135,6 +135,7 @@ impl Problem {
         let mut bracket = [0.0, ln_1p(target * greater).sqrt()];
         let mut values = [if self.ratio > 0.0 { value(0.0) } else { -MAX_LN }, value(bracket[1])];
         let mut step = 0.25;
+        // The fastest start lies within the range of doubles.
         while values[0] > 0.0 && step < MAX_LN {
             bracket = [bracket[0] - step, bracket[0]];
             values = [value(bracket[0]), values[0]];

@@ -74,6 +74,7 @@ impl Ellipse {
     /// Whether the ellipse is within rounding.
     fn is_rounding(&self) -> bool {
         let [y_1, y_2] = self.centre.map(|y| y.high.abs());
+        // The smaller coefficient may vanish.
         let sizes = [y_1 + ROOT_OF_ROUNDING * y_2, y_2 + ROOT_OF_ROUNDING * y_1];
         self.half.iter().zip(sizes).all(|(row, size)| libm::hypot(row[0], row[1]) <= 0.5 * f64::EPSILON * size)
     }

@@ -136,6 +136,7 @@ impl<'a> Polar<'a> {
             let size = polar.centre[0].high.abs() + polar.centre[1].high.abs();
             let width = (p * s - q * r).abs() / (p.abs() + q.abs() + r.abs() + s.abs());
             polar.border.set(1.0);
+            // In a wider set the first search knows the border to 1e-8.
             polar.rough = rough.filter(|_| width > ROOT_OF_ROUNDING * size);
         }
         Some(polar)

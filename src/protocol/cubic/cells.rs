@@ -370,6 +370,7 @@ fn chart(frame: &CellInputs, cells: &[CellKey; CELLS_PER_PLAN]) -> [CellPlan; CE
         let squared = gain[c] > 0.0;
         let (side, gap) = if squared { (centres.side[c], centres.gap[c]) } else { (steady as f32, 0.0) };
         let one_map = !squared || centres.common[c] & ((gap == 0.0) | (gap >= MIN_GAP as f32)) & (gap <= 1.0);
+        // Coordinates of farther cells lose digits.
         let meant = middles[0][c].abs() + middles[1][c].abs() < MAX_ZERO_DISTANCE;
         let none = CellPlan { place: cells[c], ..CellPlan::default() };
         if !(unsure[c] == 0.0 && one_map && meant) {

@@ -230,6 +230,7 @@ impl Assembly {
     ) -> Result<(), Status> {
         let span = route.span(from, to);
         let piece = SmoothPiece::new(&self.slider, (&start, &end), &span, self.rtol, stats)?;
+        // Far above the underflow of doubles.
         if piece.v.low < 1.0 / MAX_SQUARABLE {
             return Err(Status::Infeasible);
         }

@@ -104,6 +104,7 @@ impl Integration<'_> {
         let rates = Rates::of(slider.state_law, state[Y], state[X]);
         let fast = slider.fast(&rates);
         // False for numbers out of range.
+        // Below IMPLICIT_FROM, so that the kinds do not alternate.
         let short = fast * self.integrator.proposal() < 2.0 * MAX_REACH;
         if !self.uses_series && !short {
             return None;
