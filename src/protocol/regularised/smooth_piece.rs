@@ -3,7 +3,7 @@
 //! `v = floor + exp g(x)`, `x` the fraction of the elapsed time. `g` meets value, slope and curvature at both ends, and
 //! has a term `-c x^3 (1 - x)^3`. Theta at the end rises strictly with `c`, from 0 to its value for `v = floor`, so there
 //! is one piece wherever the optimum itself stays above the floor. The floor is 0, or 1 where that piece falls below
-//! `v = 1` and a piece above 1 exists.
+//! `v = 1`, both ends are more than 1e-12 above it, and a piece above 1 exists.
 //!
 //! An end of the protocol may lie `rho > 1` times as far above the floor as the mean `int theta v dt/(t sqrt(theta_0
 //! theta_1))` over a piece of length `t`. Then the fall from that end is short: the rise of `g` runs over the stretched
@@ -78,7 +78,9 @@ impl SmoothPiece {
         stats: &mut SolverStats,
     ) -> Result<SmoothPiece, Status> {
         let piece = SmoothPiece::above(0.0, slider, (start, end), optimum, rtol, stats)?;
-        if piece.v.low < 1.0 && start.v[0] > 1.0 && end.v[0] > 1.0 {
+        // Nearer to the bound, rounding of the exponent alone would decide whether a piece falls below it.
+        let above = start.v[0].min(end.v[0]) - 1.0;
+        if piece.v.low < 1.0 && above > LONG_ROUNDING_RTOL {
             let inside = SmoothPiece::above(1.0, slider, (start, end), optimum, rtol, stats);
             return Ok(inside.unwrap_or(piece));
         }
