@@ -635,6 +635,30 @@ fn regress_pieces_of_a_billionth_of_the_duration_are_solved() {
     }
 }
 
+/// Ends within rounding of the bound: rounding chose between two pieces, so works at two accuracies differed by 2e-4 of themselves.
+#[test]
+fn regress_rounding_does_not_choose_the_piece() {
+    let slider = |a, b| SpringBlock { law: Law { a, b }, k: 1.0, m: 0.0 };
+    let cases = [
+        (slider(0.009997349188535258, 0.0015176379993275158), 641667.2741643195, 1.050814111963941e-14, 0.1358523),
+        (slider(0.002306516995236996, 0.00036020391600471215), 1.0095763067871886, 1.0908071333667237e-7, 0.1567214),
+    ];
+    for (slider, v_f, t_f, part) in cases {
+        for v_i in [1.0 + f64::EPSILON, 1.0000000000000016, 1.0000000000000038, 1.0 + 1e-13] {
+            let case = Case { slider, velocities: (v_i, v_f), t_f, bounded: false };
+            let at = |rtol| solve(&case, part * t_f, rtol).value.expect("is solved").work;
+            for rtol in [1e-6, 1e-9, 3.8e-13] {
+                assert!(
+                    relative(at(rtol), at(1e-12)) <= 2.0 * (rtol + 1e-12),
+                    "{v_i} {rtol}: {} {}",
+                    at(rtol),
+                    at(1e-12)
+                );
+            }
+        }
+    }
+}
+
 /// Where friction falls below `b - a` the velocity of the optimum has a minimum inside, which the rows did not see.
 #[test]
 fn regress_the_least_velocity_may_lie_inside_the_optimum() {

@@ -78,9 +78,9 @@ impl SmoothPiece {
         stats: &mut SolverStats,
     ) -> Result<SmoothPiece, Status> {
         let piece = SmoothPiece::above(0.0, slider, (start, end), optimum, rtol, stats)?;
-        // Nearer to the bound, rounding of the exponent alone would decide whether a piece falls below it.
-        let above = start.v[0].min(end.v[0]) - 1.0;
-        if piece.v.low < 1.0 && above > LONG_ROUNDING_RTOL {
+        // With ends nearer to the bound, rounding alone would decide whether the piece falls below it.
+        let margin = start.v[0].min(end.v[0]) - 1.0;
+        if piece.v.low < 1.0 && margin > LONG_ROUNDING_RTOL {
             let inside = SmoothPiece::above(1.0, slider, (start, end), optimum, rtol, stats);
             return Ok(inside.unwrap_or(piece));
         }
