@@ -2,7 +2,6 @@
 
 use super::MAX_STEPS;
 use super::double_double::DoubleDouble;
-use super::real::Real;
 
 /// `c[0] + c[1] x + c[2] x^2 + c[3] x^3`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,11 +173,11 @@ const THIRD: f64 = 1.0 / 3.0;
 
 /// The zeros of a polynomial of degree `N` in the closed upper half plane, a conjugate pair given twice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Zeros<const N: usize, T = f64> {
+pub struct Zeros<const N: usize> {
     /// Real parts.
-    pub re: [T; N],
+    pub re: [f64; N],
     /// Imaginary parts, at least 0.
-    pub im: [T; N],
+    pub im: [f64; N],
 }
 
 /// `cos(acos(c)/3)` on `0 <= c <= 1` in powers of `c`: Chebyshev interpolant with an error of 5e-6; one Newton step follows.
@@ -189,64 +188,79 @@ const TRISECTION: [f64; 5] =
 ///
 /// The reciprocals are computed, so that a vanishing leading coefficient gives a very large or infinite zero.
 #[inline(always)]
-pub fn cubic_zeros<T: Real>(d: [T; 4]) -> Zeros<3, T> {
-    let [zero, half, one, two, three, four, twelve, a_third] = [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 12.0, THIRD].map(T::of);
-    let scale = one / d[0];
-    let third = d[1] * scale * a_third;
+pub fn cubic_zeros(d: [f64; 4]) -> Zeros<3> {
+    let scale = 1.0 / d[0];
+    let third = d[1] * scale * THIRD;
     let (q, r) = (d[2] * scale, d[3] * scale);
     // y = u - third, u^3 - 3 big_q u + 2 big_r = 0.
-    let big_q = third * third - q * a_third;
-    let big_r = third * (third * third - half * q) + half * r;
+    let big_q = third * third - q * THIRD;
+    let big_r = third * (third * third - 0.5 * q) + 0.5 * r;
     let size = big_r.abs();
     let excess = size * size - big_q * big_q * big_q;
-    let single = excess > zero;
+    let single = excess > 0.0;
     // One real zero: Cardano's formula, in the form whose terms have equal signs. Three real zeros: Viète's formula for the zero farthest from
     // the mean. Both are nested fractions, so that each lane divides only once.
-    let cube = size + (if single { excess } else { zero }).sqrt() + T::MIN_NORMAL;
-    let s = cube.cube_root();
-    let root = (if big_q > zero { big_q } else { zero }).sqrt() + T::MIN_NORMAL;
-    let inner = if single { big_q } else { size } / if single { s } else { root * root * root + T::MIN_NORMAL };
-    let c = if inner < one { inner } else { one };
-    let [g0, g1, g2, g3, g4] = TRISECTION.map(T::of);
+    let cube = size + (if single { excess } else { 0.0 }).sqrt() + f64::MIN_POSITIVE;
+    let s = cube_root(cube);
+    let root = (if big_q > 0.0 { big_q } else { 0.0 }).sqrt() + f64::MIN_POSITIVE;
+    let inner = if single { big_q } else { size } / if single { s } else { root * root * root + f64::MIN_POSITIVE };
+    let c = if inner < 1.0 { inner } else { 1.0 };
+    let [g0, g1, g2, g3, g4] = TRISECTION;
     let g = g0 + c * (g1 + c * (g2 + c * (g3 + c * g4)));
-    let above = if single { two * size } else { (four * g * g - three) * g - c };
-    let below = if single { s * s - big_q + inner * inner + T::MIN_NORMAL } else { twelve * g * g - three };
+    let above = if single { 2.0 * size } else { (4.0 * g * g - 3.0) * g - c };
+    let below = if single { s * s - big_q + inner * inner + f64::MIN_POSITIVE } else { 12.0 * g * g - 3.0 };
     let outer = above / below;
-    let u = if single { outer } else { two * root * (g - outer) };
-    let u = if big_r > zero { -u } else { u };
+    let u = if single { outer } else { 2.0 * root * (g - outer) };
+    let u = if big_r > 0.0 { -u } else { u };
     let y = u - third;
-    let inverse = one / y;
+    let inverse = 1.0 / y;
     // The remaining quadratic, y^2 - 2 mean y + product: divided from the low end for a large zero, from the high end for a small one.
     let large = (y * y * y).abs() > r.abs();
-    let rest = three * third + y;
+    let rest = 3.0 * third + y;
     let product = if large { -r * inverse } else { q + y * rest };
-    let mean = -half * if large { (product - q) * inverse } else { rest };
+    let mean = -0.5 * if large { (product - q) * inverse } else { rest };
     let spread = mean * mean - product;
-    let real = spread >= zero;
+    let real = spread >= 0.0;
     let distance = spread.abs().sqrt();
-    let farther = if mean < zero { mean - distance } else { mean + distance };
-    let norm = mean * mean + distance * distance + T::MIN_NORMAL;
-    let scale = one / if real { farther } else { norm };
+    let farther = if mean < 0.0 { mean - distance } else { mean + distance };
+    let norm = mean * mean + distance * distance + f64::MIN_POSITIVE;
+    let scale = 1.0 / if real { farther } else { norm };
     let (re, im) = (mean * scale, distance * scale);
     Zeros {
         re: [inverse, if real { scale } else { re }, if real { farther / product } else { re }],
-        im: [zero, if real { zero } else { im }, if real { zero } else { im }],
+        im: [0.0, if real { 0.0 } else { im }, if real { 0.0 } else { im }],
     }
 }
 
 /// The zeros of `c + b x + a x^2`, without branches and without cancellation; zeros at infinity are very large, infinite or NaN.
 #[inline(always)]
-pub fn quadratic_zeros<T: Real>([c, b, a]: [T; 3]) -> Zeros<2, T> {
-    let zero = T::of(0.0);
-    let half = T::of(-0.5) * b;
+pub fn quadratic_zeros([c, b, a]: [f64; 3]) -> Zeros<2> {
+    let half = -0.5 * b;
     let discriminant = half * half - a * c;
-    let real = discriminant >= zero;
+    let real = discriminant >= 0.0;
     let root = discriminant.abs().sqrt();
-    let q = if half < zero { half - root } else { half + root };
-    let scale = T::of(1.0) / a;
+    let q = if half < 0.0 { half - root } else { half + root };
+    let scale = 1.0 / a;
     let (re, im) = (half * scale, root * scale.abs());
     Zeros {
         re: [if real { q * scale } else { re }, if real { c / q } else { re }],
-        im: [if real { zero } else { im }, if real { zero } else { im }],
+        im: [if real { 0.0 } else { im }, if real { 0.0 } else { im }],
     }
+}
+
+/// The cube root of a positive normal number, accurate to the last bits if its square and cube do not overflow.
+#[inline(always)]
+fn cube_root(x: f64) -> f64 {
+    // A third of the exponent and of the mantissa at once: 1/3 = 1/4 + 1/16 + …, and two thirds of the bias. The error is 5 %.
+    let bits = x.to_bits();
+    let sum = (bits >> 2) + (bits >> 4);
+    let sum = sum + (sum >> 4);
+    let sum = sum + (sum >> 8);
+    let rough = f64::from_bits(sum + (sum >> 16) + 0x2A9F_7893_0000_0000);
+    // Halley's method triples the digits: 5e-2, 1e-4, 1e-12.
+    let step = |y: f64| {
+        let cube = y * y * y;
+        y * (cube + x + x) / (cube + cube + x)
+    };
+    step(step(rough))
 }

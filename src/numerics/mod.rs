@@ -11,7 +11,6 @@ pub mod lambert;
 pub mod lanes;
 pub mod polynomial;
 pub mod radau;
-pub mod real;
 pub mod root;
 pub mod stiff;
 pub mod turning;

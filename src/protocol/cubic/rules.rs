@@ -15,7 +15,6 @@ use crate::numerics::double_double::DoubleDouble;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::gauss::rule;
 use crate::numerics::lanes::{LANES, Lanes, least};
-use crate::numerics::real::Real;
 
 /// A change of variable on a panel, relative to a `centre`: `delta = x - centre`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -179,39 +178,38 @@ pub(super) const MAX_ZERO_DISTANCE: f64 = 1e9;
 
 /// The zeros of several shortcuts, from the expansion about the end; zeros near the start are not yet [`polished`].
 #[inline(always)]
-pub(super) fn rough_zeros<T: Real>(theta: [T; 4], n: [T; 3]) -> cubic::Zeros<ZEROS, T> {
+pub(super) fn rough_zeros(theta: [f64; 4], n: [f64; 3]) -> cubic::Zeros<ZEROS> {
     let (q, r) = (cubic_zeros(theta), quadratic_zeros(n));
     let (mut re, mut im) =
         ([q.re[0], q.re[1], q.re[2], r.re[0], r.re[1]], [q.im[0], q.im[1], q.im[2], r.im[0], r.im[1]]);
     for k in 0..ZEROS {
-        (re[k], im[k]) = (T::of(1.0) + clamp(re[k]), clamp(im[k]));
+        (re[k], im[k]) = (1.0 + clamp(re[k]), clamp(im[k]));
     }
     cubic::Zeros { re, im }
 }
 
 /// Whether a zero is so close to the start that the expansion about the end loses too many digits.
 #[inline(always)]
-pub(super) fn is_near_start<T: Real>(x: T, y: T) -> bool {
-    (x.abs() < T::of(0.1)) & (y < T::of(0.1))
+pub(super) fn is_near_start(x: f64, y: f64) -> bool {
+    (x.abs() < 0.1) & (y < 0.1)
 }
 
-/// One Newton step towards the zero of a cubic near `x + iy`; `None` if the step is too large for a correction.
+/// The zero of a cubic near `x + iy` after a Newton step, unless the step is too large for a correction.
 #[inline(always)]
-pub(super) fn polished<T: Real>(c: &[T; 4], x: T, y: T) -> Option<(T, T)> {
+pub(super) fn polished(c: &[f64; 4], x: f64, y: f64) -> (f64, f64) {
     let [c0, c1, c2, c3] = *c;
-    let [two, three, six] = [2.0, 3.0, 6.0].map(T::of);
     // Value and derivative by Horner's scheme: complex, with imaginary parts factored as i y.
     let (p, q) = (c2 + c3 * x, c3);
     let (p, q) = (c1 + p * x - q * y * y, p + q * x);
     let (value, value_i) = (c0 + p * x - q * y * y, p + q * x);
-    let (slope, slope_i) = (c1 + x * (two * c2 + three * c3 * x) - three * c3 * y * y, two * c2 + six * c3 * x);
+    let (slope, slope_i) = (c1 + x * (2.0 * c2 + 3.0 * c3 * x) - 3.0 * c3 * y * y, 2.0 * c2 + 6.0 * c3 * x);
     let (value_i, slope_i) = (value_i * y, slope_i * y);
-    let norm = slope * slope + slope_i * slope_i + T::MIN_NORMAL;
-    let scale = T::of(1.0) / norm;
+    let norm = slope * slope + slope_i * slope_i + f64::MIN_POSITIVE;
+    let scale = 1.0 / norm;
     let step = (value * slope + value_i * slope_i) * scale;
     let step_i = (value_i * slope - value * slope_i) * scale;
-    let small = step.abs() + step_i.abs() < T::of(MAX_CORRECTION);
-    small.then(|| (x - step, (y - step_i).abs()))
+    let small = step.abs() + step_i.abs() < MAX_CORRECTION;
+    if small { (x - step, (y - step_i).abs()) } else { (x, y) }
 }
 
 /// Greatest relative correction of a zero by a Newton step. Chosen: the closed forms give some digits of every zero.
@@ -219,10 +217,9 @@ const MAX_CORRECTION: f64 = 1e-3;
 
 /// `x` clamped to `[-MAX_ZERO_DISTANCE, MAX_ZERO_DISTANCE]`; NaN is far away.
 #[inline(always)]
-fn clamp<T: Real>(x: T) -> T {
-    let far = T::of(MAX_ZERO_DISTANCE);
-    let x = if x < far { x } else { far };
-    if x > -far { x } else { -far }
+fn clamp(x: f64) -> f64 {
+    let x = if x < MAX_ZERO_DISTANCE { x } else { MAX_ZERO_DISTANCE };
+    if x > -MAX_ZERO_DISTANCE { x } else { -MAX_ZERO_DISTANCE }
 }
 
 impl Zeros {

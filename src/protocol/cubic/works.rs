@@ -3,22 +3,16 @@
 use super::bins::{BINS, Bins, CUT_BIN, nodes_of};
 use super::cells::OWN_PLAN_BIN;
 use super::path::Path;
-use super::plan::{PlannedPanels, plan, plan_parts};
+use super::plan::{PlannedPanels, plan};
 use super::queue::{Cuts, Queue};
 use super::{Landscape, PerShortcut, SPAN_SHORTCUTS};
 use crate::numerics::lanes::LANES;
 use crate::protocol::SolverStats;
 
-/// Works in progress. A shortcut waits for the plan of its cell, possibly for its own plan or one with larger powers, and then for its sum.
+/// Works in progress. A shortcut waits for the plan of its cell, possibly for its own plan or that of its parts, and then for its sum.
 pub(super) struct Works<'a> {
     due: Queue,
-    planned: Planned<'a>,
-}
-
-/// Shortcuts that need their own plan, and the last plans.
-struct Planned<'a> {
     alone: Queue,
-    deep: Queue,
     from_cells: PlannedPanels,
     own: PlannedPanels,
     sums: Sums<'a>,
@@ -38,97 +32,82 @@ impl<'a> Works<'a> {
     pub fn new(of: &'a Landscape, work: &'a mut [f64], bins: &'a mut Bins) -> Works<'a> {
         let sums = Sums { of, work, cut: Cuts::EMPTY, bins, stats: SolverStats::default() };
         let (from_cells, own) = (PlannedPanels::default(), PlannedPanels::default());
-        let planned = Planned { alone: Queue::default(), deep: Queue::default(), from_cells, own, sums };
-        Works { due: Queue::default(), planned }
+        Works { due: Queue::default(), alone: Queue::default(), from_cells, own, sums }
     }
 
     /// Adds the feasible shortcut at `index`, if its work is requested.
     #[inline(always)]
     pub fn push(&mut self, index: usize, a_2: f64, a_3: f64) {
-        if index < self.planned.sums.work.len() && self.due.push(index, a_2, a_3) {
-            self.plan();
+        if index < self.sums.work.len() && self.due.push(index, a_2, a_3) {
+            self.plan_due();
         }
     }
 
     /// Adds the feasible shortcuts from `first` on.
     pub fn push_span(&mut self, first: usize, a_2: &PerShortcut, a_3: &PerShortcut) {
-        if self.planned.sums.work.len() < first + SPAN_SHORTCUTS {
+        if self.sums.work.len() < first + SPAN_SHORTCUTS {
             for lane in 0..SPAN_SHORTCUTS {
                 self.push(first + lane, a_2[lane], a_3[lane]);
             }
             return;
         }
         let indices: [usize; SPAN_SHORTCUTS] = std::array::from_fn(|lane| first + lane);
-        self.planned.plan(&indices, [a_2, a_3]);
+        let Works { alone, from_cells, own, sums, .. } = self;
+        sums.plan_cells(&indices, [a_2, a_3], from_cells, (alone, own));
     }
 
     /// Sums the remaining shortcuts.
     pub fn finish(mut self) -> SolverStats {
-        self.plan();
-        let Planned { alone, deep, own, sums, .. } = &mut self.planned;
-        sums.plan(alone, deep, own);
-        sums.deepen(deep);
-        sums.part();
+        self.plan_due();
+        let Works { mut alone, mut own, mut sums, .. } = self;
+        sums.plan_alone(&mut alone, &mut own);
+        sums.plan_parts();
         sums.bins.close(sums.of, sums.work);
         sums.stats
     }
 
-    fn plan(&mut self) {
-        if let Some((indices, places)) = self.due.take() {
-            self.planned.plan(indices, places);
-        }
-    }
-}
-
-impl Planned<'_> {
-    /// Plans shortcuts from their cells; other shortcuts wait for their own plan.
-    fn plan(&mut self, indices: &[usize], [a_2, a_3]: [&PerShortcut; 2]) {
-        let Planned { alone, deep, from_cells: plan, own, sums } = self;
-        sums.bins.cells.plan(&sums.of.frame, a_2, a_3, plan);
-        for (k, indices) in indices.chunks(LANES).enumerate() {
-            let first = k * LANES;
-            let bin = plan.bin[first];
-            if bin != OWN_PLAN_BIN && indices.len() == LANES && plan.bin[first..first + LANES] == [bin; LANES] {
-                sums.settle_all(plan, first, indices, [a_2, a_3]);
-                continue;
-            }
-            for (lane, &i) in (first..).zip(indices) {
-                if plan.bin[lane] != OWN_PLAN_BIN {
-                    sums.settle(plan, lane, i, [a_2[lane], a_3[lane]]);
-                } else if alone.push(i, a_2[lane], a_3[lane]) {
-                    sums.plan(alone, deep, own);
-                }
-            }
+    fn plan_due(&mut self) {
+        let Works { due, alone, from_cells, own, sums } = self;
+        if let Some((indices, places)) = due.take() {
+            sums.plan_cells(indices, places, from_cells, (alone, own));
         }
     }
 }
 
 impl Sums<'_> {
-    /// Plans shortcuts one by one.
-    fn plan(&mut self, alone: &mut Queue, deep: &mut Queue, made: &mut PlannedPanels) {
-        let Some((indices, [a_2, a_3])) = alone.take() else { return };
-        plan(&self.of.ends, a_2, a_3, &self.of.accuracy, made);
-        for (lane, &i) in indices.iter().enumerate() {
-            if made.deeper[lane] == 0.0 {
-                self.settle(made, lane, i, [a_2[lane], a_3[lane]]);
-            } else if deep.push(i, a_2[lane], a_3[lane]) {
-                self.deepen(deep);
+    /// Plans shortcuts from their cells; other shortcuts wait for their own plan.
+    fn plan_cells(
+        &mut self,
+        indices: &[usize],
+        [a_2, a_3]: [&PerShortcut; 2],
+        plan: &mut PlannedPanels,
+        (alone, own): (&mut Queue, &mut PlannedPanels),
+    ) {
+        self.bins.cells.plan(&self.of.frame, a_2, a_3, plan);
+        for (k, indices) in indices.chunks(LANES).enumerate() {
+            let first = k * LANES;
+            let bin = plan.bin[first];
+            if bin != OWN_PLAN_BIN && indices.len() == LANES && plan.bin[first..first + LANES] == [bin; LANES] {
+                self.settle_all(plan, first, indices, [a_2, a_3]);
+                continue;
+            }
+            for (lane, &i) in (first..).zip(indices) {
+                if plan.bin[lane] != OWN_PLAN_BIN {
+                    self.settle(plan, lane, i, [a_2[lane], a_3[lane]]);
+                } else if alone.push(i, a_2[lane], a_3[lane]) {
+                    self.plan_alone(alone, own);
+                }
             }
         }
     }
 
-    /// Plans shortcuts with larger powers.
-    fn deepen(&mut self, deep: &mut Queue) {
-        let Some((indices, [a_2, a_3])) = deep.take() else { return };
-        let mut plan = PlannedPanels::default();
-        plan_parts(
-            &self.of.ends,
-            [a_2, a_3, &[0.0; SPAN_SHORTCUTS], &[1.0; SPAN_SHORTCUTS]],
-            &self.of.accuracy,
-            &mut plan,
-        );
+    /// Plans shortcuts one by one.
+    fn plan_alone(&mut self, alone: &mut Queue, own: &mut PlannedPanels) {
+        let Some((indices, [a_2, a_3])) = alone.take() else { return };
+        let whole = [a_2, a_3, &[0.0; SPAN_SHORTCUTS], &[1.0; SPAN_SHORTCUTS]];
+        plan(&self.of.ends, whole, &self.of.accuracy, own);
         for (lane, &i) in indices.iter().enumerate() {
-            self.settle(&plan, lane, i, [a_2[lane], a_3[lane]]);
+            self.settle(own, lane, i, [a_2[lane], a_3[lane]]);
         }
     }
 
@@ -150,16 +129,16 @@ impl Sums<'_> {
             self.stats.nodes += nodes_of(bin);
             self.bins.add(self.of, (plan, lane), [place[0], place[1], 0.0, 1.0], index, self.work);
         } else if self.cut.push(index, place, plan.cut[lane]) {
-            self.part();
+            self.plan_parts();
         }
     }
 
     /// Plans the parts of shortcuts that are cut in two. Shortcuts that need more are summed alone.
-    fn part(&mut self) {
+    fn plan_parts(&mut self) {
         let Sums { of, work, cut, bins, stats } = self;
         let Some((indices, parts)) = cut.take() else { return };
-        let mut plan = PlannedPanels::default();
-        plan_parts(&of.ends, parts, &of.accuracy, &mut plan);
+        let mut made = PlannedPanels::default();
+        plan(&of.ends, parts, &of.accuracy, &mut made);
         let [a_2, a_3, low, high] = parts;
         for (k, &i) in indices.iter().enumerate() {
             stats.quadratures += 1;
@@ -167,11 +146,11 @@ impl Sums<'_> {
             let path = Path::new(&of.ends, a_2[k], a_3[k]);
             // A shortcut may be fastest at the cut.
             let near = path.is_within(if low[k] == 0.0 { high[k] } else { low[k] }, of.accuracy.longest);
-            if near && lanes.iter().all(|&lane| plan.bin[lane] < BINS as u32) {
+            if near && lanes.iter().all(|&lane| made.bin[lane] < BINS as u32) {
                 work[i] = of.work_of_ends;
                 for lane in lanes {
-                    stats.nodes += nodes_of(plan.bin[lane] as usize);
-                    bins.add(of, (&plan, lane), [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
+                    stats.nodes += nodes_of(made.bin[lane] as usize);
+                    bins.add(of, (&made, lane), [a_2[lane], a_3[lane], low[lane], high[lane]], i, work);
                 }
             } else {
                 work[i] = of.work_of_ends + of.work(&path, stats);
