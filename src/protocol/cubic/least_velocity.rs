@@ -6,7 +6,7 @@
 use multiversion::multiversion;
 
 use super::path::Ends;
-use super::product::{NearSlip, Product, Prz, Slip, positive};
+use super::product::{Product, Prz, Slip, positive};
 use crate::model::StateLaw;
 use crate::numerics::elementary::ln;
 use crate::numerics::lanes::{LANES, Lanes, Vector, choose, lower};
@@ -91,11 +91,8 @@ impl Trend {
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
 pub(super) fn least_velocities(state: StateLaw, ends: &Ends, a_2: &Lanes, a_3: &Lanes, wanted: &Lanes) -> Least {
-    let powers = [Vector(*a_2), Vector(*a_3), ends.rise.high - (Vector(*a_2) + Vector(*a_3))];
     if state == StateLaw::Prz {
         least_by::<Prz>(ends, a_2, a_3, wanted)
-    } else if NearSlip::holds(ends.t_f, powers) {
-        least_by::<NearSlip>(ends, a_2, a_3, wanted)
     } else {
         least_by::<Slip>(ends, a_2, a_3, wanted)
     }

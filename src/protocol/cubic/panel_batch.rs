@@ -12,11 +12,11 @@ use multiversion::multiversion;
 
 use super::path::Ends;
 use super::plan::MAX_SQUARINGS;
-use super::product::{Ageing, NearSlip, Product, Prz, Slip};
+use super::product::{Ageing, Product, Prz, Slip};
 use crate::model::{Law, StateLaw};
 use crate::numerics::elementary::ln;
 use crate::numerics::gauss::{MAX_HALF, Primitive, ROWS};
-use crate::numerics::lanes::{Lanes, Vector, choose, least};
+use crate::numerics::lanes::{Lanes, Vector, choose};
 
 /// Panels of eight shortcuts with equal numbers of nodes, each with its map `delta = side (gap - s^(2^squarings))` of the distance from an end
 /// of the panel.
@@ -41,7 +41,6 @@ pub(super) struct PanelBatch {
 /// The friction data common to the shortcuts of a landscape.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrictionTerms {
-    state: StateLaw,
     /// The factor of `ln n`.
     a: f64,
     /// `b - a`.
@@ -64,7 +63,7 @@ impl FrictionTerms {
             StateLaw::Slip => 0.0,
             StateLaw::Prz => 0.5 * law.a,
         };
-        FrictionTerms { state, a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
+        FrictionTerms { a, slope, drive: unit * ends.t_f, constant: 1.0 - a * ln(ends.t_f), ln_theta }
     }
 }
 
@@ -109,35 +108,21 @@ pub(super) struct Prepared {
     pub scale: Vector,
     /// `1/t_f`.
     inverse_time: Vector,
-    /// Whether [`NearSlip`] holds on all of the path.
-    near: bool,
-    kernel: Kernel,
-}
-
-/// The selection of a kernel for a batch, by its least and greatest power.
-#[derive(Debug, Clone, Copy, Default)]
-enum Kernel {
-    Squares,
-    Square,
-    Fourth,
-    #[default]
-    Eighth,
+    /// Whether all maps are squares.
+    are_squares: bool,
 }
 
 impl Prepared {
     /// The works; those of empty lanes are meaningless.
     #[inline(always)]
     pub fn works(&self, state: StateLaw, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
-        match (state, self.kernel) {
-            (StateLaw::Ageing, Kernel::Squares) => squares(self, rule, space),
-            (StateLaw::Ageing, Kernel::Square) => square(self, rule, space),
-            (StateLaw::Ageing, Kernel::Fourth) => fourth(self, rule, space),
-            (StateLaw::Ageing, Kernel::Eighth) => eighth(self, rule, space),
-            (StateLaw::Slip, Kernel::Squares) if self.near => near_slip_squares(self, rule, space),
-            (StateLaw::Slip, _) if self.near => near_slip(self, rule, space),
-            (StateLaw::Slip, _) => slip(self, rule, space),
-            (StateLaw::Prz, Kernel::Squares) => prz_squares(self, rule, space),
-            (StateLaw::Prz, _) => prz(self, rule, space),
+        match (state, self.are_squares) {
+            (StateLaw::Ageing, true) => sum::<true, Ageing>(self, rule, space),
+            (StateLaw::Ageing, false) => sum::<false, Ageing>(self, rule, space),
+            (StateLaw::Slip, true) => sum::<true, Slip>(self, rule, space),
+            (StateLaw::Slip, false) => sum::<false, Slip>(self, rule, space),
+            (StateLaw::Prz, true) => sum::<true, Prz>(self, rule, space),
+            (StateLaw::Prz, false) => sum::<false, Prz>(self, rule, space),
         }
     }
 }
@@ -176,7 +161,6 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     }
     let ln_n = (n_at(near) * n_at(far)).map(ln);
     let mut factor = unit;
-    let (fewest, most) = (least(&squarings.0), -least(&squarings.map(|squarings| -squarings).0));
     for level in 1..=MAX_SQUARINGS {
         let more = squarings - Vector::splat(f64::from(level) - 0.5);
         factor = choose(more, factor + factor, factor);
@@ -184,7 +168,6 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
     let half = 0.5 * (to - from);
     *prepared = Prepared {
         inverse_time: Vector::splat(1.0 / t_f),
-        near: friction.state == StateLaw::Slip && NearSlip::holds(t_f, [a_2, a_3, a_4]),
         theta: [q0, side * q1, q2, side * q3],
         n: [n0, side * n1, n2],
         slope: [(friction.a / friction.drive) * n1, (2.0 * friction.a / friction.drive) * (side * n2)],
@@ -196,54 +179,16 @@ pub(super) fn prepare(panel_batch: &PanelBatch, ends: &Ends, friction: &Friction
         half,
         unit,
         scale: half * factor,
-        kernel: if fewest == 1.0 && most == 1.0 {
-            Kernel::Squares
-        } else if most <= 1.0 {
-            Kernel::Square
-        } else if most <= 2.0 {
-            Kernel::Fourth
-        } else {
-            Kernel::Eighth
-        },
+        are_squares: squarings == unit,
     };
 }
 
-macro_rules! kernels {
-    ($($(#[$doc:meta])* $name:ident = $most:literal, $same:literal, $product:ty;)*) => {$(
-        $(#[$doc])*
-        #[multiversion(targets(
-            "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-            "x86_64+avx+avx2+bmi1+bmi2"
-        ))]
-        fn $name(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
-            sum::<$most, $same, $product>(prepared, rule, space)
-        }
-    )*};
-}
-
-kernels! {
-    /// All maps need one square root.
-    squares = 1, true, Ageing;
-    /// No map needs more than one square root.
-    square = 1, false, Ageing;
-    /// No map needs more than two square roots.
-    fourth = 2, false, Ageing;
-    /// Any maps.
-    eighth = 3, false, Ageing;
-    near_slip_squares = 1, true, NearSlip;
-    near_slip = 3, false, NearSlip;
-    slip = 3, false, Slip;
-    prz_squares = 1, true, Prz;
-    prz = 3, false, Prz;
-}
-
-/// The works if no map squares more than `SQUARINGS` times, and if all square exactly that often for `SAME`.
-#[inline(always)]
-fn sum<const SQUARINGS: u32, const SAME: bool, P: Product>(
-    prepared: &Prepared,
-    rule: &Primitive,
-    space: &mut NodeBuffer,
-) -> Lanes {
+/// The works of any maps, or of squares only.
+#[multiversion(targets(
+    "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx+avx2+bmi1+bmi2"
+))]
+fn sum<const SQUARES: bool, P: Product>(prepared: &Prepared, rule: &Primitive, space: &mut NodeBuffer) -> Lanes {
     let NodeBuffer { v_even, v_odd, g_even, g_odd } = space;
     let Prepared { theta, n, slope, drive, tau, gap, squarings, middle, half, unit, scale, inverse_time, .. } =
         *prepared;
@@ -255,8 +200,8 @@ fn sum<const SQUARINGS: u32, const SAME: bool, P: Product>(
         let places = v.iter_mut().zip(&mut g).zip(&mut below).zip(&mut weight);
         for ((((v, g), below), weight), x) in places.zip([rule.x[j], -rule.x[j]]) {
             let s = middle + x * half;
-            let (mut power, mut jacobian) = if SAME { (s * s, s) } else { (s, unit) };
-            for level in 0..if SAME { 0 } else { SQUARINGS } {
+            let (mut power, mut jacobian) = if SQUARES { (s * s, s) } else { (s, unit) };
+            for level in 0..if SQUARES { 0 } else { MAX_SQUARINGS } {
                 let more = squarings - Vector::splat(f64::from(level) + 0.5);
                 (power, jacobian) = (choose(more, power * power, power), choose(more, power * jacobian, jacobian));
             }

@@ -2,7 +2,7 @@
 
 use crate::model::StateLaw;
 use crate::numerics::lambert::{NEAR_END, far_branch, near_branches};
-use crate::numerics::lanes::{Vector, choose, least, lower};
+use crate::numerics::lanes::{Vector, choose, least};
 
 /// `theta v` as a function of the lack `n/t_f` in every lane, without branches: [`StateLaw::product`].
 pub(super) trait Product {
@@ -30,9 +30,6 @@ pub(super) struct Prz;
 /// The slip law.
 pub(super) struct Slip;
 
-/// The slip law where the lack is at most [`NEAR_END`]: the same bits.
-pub(super) struct NearSlip;
-
 impl Product for Ageing {
     const LAW: StateLaw = StateLaw::Ageing;
 
@@ -57,39 +54,20 @@ impl Product for Prz {
     }
 }
 
-impl Product for NearSlip {
-    const LAW: StateLaw = StateLaw::Slip;
-
-    #[inline(always)]
-    fn of(lack: Vector) -> Vector {
-        (1.0 / std::f64::consts::E) * near_branches(lack)
-    }
-}
-
 impl Product for Slip {
     const LAW: StateLaw = StateLaw::Slip;
 
     #[inline(always)]
     fn of(lack: Vector) -> Vector {
+        let near = (1.0 / std::f64::consts::E) * near_branches(lack);
+        let rest = Vector::splat(NEAR_END) - lack;
+        if least(&rest.0) >= 0.0 {
+            return near;
+        }
         // Each lane has the formula of its own argument, whatever the others hold.
-        let far = lack.map(|lack| (1.0 / std::f64::consts::E) * far_branch(lack));
-        choose(lack - Vector::splat(NEAR_END), far, NearSlip::of(lack))
+        choose(Vector::splat(0.0) - rest, lack.map(|lack| (1.0 / std::f64::consts::E) * far_branch(lack)), near)
     }
 }
-
-impl NearSlip {
-    /// Whether the lack of eight shortcuts, with coefficients of theta from the first power on, is nowhere near [`NEAR_END`] or beyond.
-    #[inline(always)]
-    pub fn holds(t_f: f64, [a_2, a_3, a_4]: [Vector; 3]) -> bool {
-        // t_f - n in Bernstein's form.
-        let second = a_2 + a_3;
-        let falls = lower(lower(a_2, second), second + a_3 + 3.0 * a_4);
-        least(&falls.0) >= t_f * (1.0 - BOUND_MARGIN * NEAR_END)
-    }
-}
-
-/// Fraction of [`NEAR_END`] that the bound of the lack may reach. Chosen: rounding at the nodes stays below the end.
-const BOUND_MARGIN: f64 = 0.999;
 
 /// The lack or `n`, which rounding may make negative on the border.
 #[inline(always)]
