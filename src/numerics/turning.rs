@@ -72,14 +72,8 @@ pub struct Turning {
 ///
 /// The derivative of `ln U` is `1/slope`, since `(1 - 1/U) dU = w dw`.
 pub fn turning(w: f64) -> Turning {
-    let place = if w <= -1.0 {
-        rising(w)
-    } else if w < 1.0 {
-        near(w)
-    } else {
-        falling(w)
-    };
-    Turning { ln_u: place.ln_u, excess: place.excess, slope: place.over / place.under }
+    let Turnings { ln_u: [ln_u], excess: [excess], over: [over], under: [under], .. } = turning_lanes(&[w]);
+    Turning { ln_u, excess, slope: over / under }
 }
 
 /// The turning function at several arguments side by side.
