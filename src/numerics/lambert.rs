@@ -5,12 +5,7 @@ use super::lanes::Vector;
 
 /// `E >= 1` with `E ln E - E + 1 = d`, that is `e^(1 + W_0((d - 1)/e))`, for `d >= 0`; to a dozen units in the last place.
 pub fn above_branch(d: f64) -> f64 {
-    if d <= NEAR_END { near_branch(d) } else { far_branch(d) }
-}
-
-/// [`above_branch`] for `d <= NEAR_END`.
-fn near_branch(d: f64) -> f64 {
-    near_branches(Vector::splat(d)).0[0]
+    if d <= NEAR_END { near_branches(Vector::splat(d)).0[0] } else { far_branch(d) }
 }
 
 /// One of both sums of a polynomial, of its even or its odd powers, in straight lines: the compiler would split the lanes of a loop.
