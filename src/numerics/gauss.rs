@@ -26,28 +26,17 @@ pub fn rule(n: usize) -> &'static Rule {
     RULES[n - 1].get_or_init(|| make(n))
 }
 
-/// Newton's method from Tricomi's estimate. The last step uses double-double, so that the rounded nodes are the nearest doubles.
+/// Newton's method in double-double from Tricomi's estimate, so that the rounded nodes are the nearest doubles.
 fn make(n: usize) -> Rule {
     let (mut x, mut w) = (vec![0.0; n], vec![0.0; n]);
     for i in 0..n.div_ceil(2) {
-        let mut t = libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5));
-        if 2 * i + 1 == n {
-            t = 0.0;
+        let mut node = DoubleDouble::new(libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)));
+        for _ in 0..5 {
+            let (p, slope) = legendre(n, node);
+            node = node - p / slope;
         }
-        for _ in 0..4 {
-            let (p, derivative) = legendre(n, DoubleDouble::new(t));
-            t -= p.high / derivative.high;
-        }
-        let t = DoubleDouble::new(t);
-        let one = DoubleDouble::new(1.0);
-        let (p, derivative) = legendre(n, t);
-        let step = -(p / derivative);
-        let node = t + step;
-        // P'' from Legendre's equation extrapolates P' to the new node.
-        let count = DoubleDouble::new((n * (n + 1)) as f64);
-        let second = (DoubleDouble::new(2.0) * t * derivative - count * p) / (one - t * t);
-        let slope = derivative + step * second;
-        let weight = DoubleDouble::new(2.0) / ((one - node * node) * slope * slope);
+        let slope = legendre(n, node).1;
+        let weight = DoubleDouble::new(2.0) / ((DoubleDouble::new(1.0) - node * node) * slope * slope);
         (x[n - 1 - i], w[n - 1 - i]) = (node.high, weight.high);
         (x[i], w[i]) = (-node.high, weight.high);
     }
@@ -57,10 +46,10 @@ fn make(n: usize) -> Rule {
     Rule { x, w }
 }
 
-/// `P_n` and its derivative by the three-term recurrence (DLMF 18.9.1, 18.9.17).
-fn legendre(n: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
-    let (mut before, mut p) = (DoubleDouble::new(1.0), x);
-    for k in 2..=n {
+/// `P_n` and, inside `(-1, 1)`, its derivative by the three-term recurrence (DLMF 18.9.1, 18.9.17).
+pub(super) fn legendre(n: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
+    let (mut before, mut p) = (DoubleDouble::new(0.0), DoubleDouble::new(1.0));
+    for k in 1..=n {
         let k = k as f64;
         let next =
             (DoubleDouble::new(2.0 * k - 1.0) * x * p - DoubleDouble::new(k - 1.0) * before) / DoubleDouble::new(k);

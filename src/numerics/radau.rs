@@ -6,6 +6,7 @@
 use std::sync::OnceLock;
 
 use super::double_double::DoubleDouble;
+use super::gauss::legendre;
 
 /// Number of nodes. Chosen: two vectors of eight.
 pub const NODES: usize = 16;
@@ -109,7 +110,6 @@ pub fn radau() -> &'static Radau {
 /// The nodes of the method with `S` stages on `[0, 1]`, ascending: Newton's method on `P_S - P_(S-1)` in double-double.
 pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
     let (one, half) = (DoubleDouble::new(1.0), DoubleDouble::new(0.5));
-    let count = DoubleDouble::new(S as f64);
     std::array::from_fn(|i| {
         if i == S - 1 {
             return one;
@@ -117,13 +117,8 @@ pub(super) fn nodes<const S: usize>() -> [DoubleDouble; S] {
         let turn = 2.0 * std::f64::consts::PI * (S - 1 - i) as f64 / (2.0 * S as f64 - 1.0);
         let mut x = DoubleDouble::new(libm::cos(turn));
         for _ in 0..8 {
-            let mut p = [DoubleDouble::new(0.0), one, x];
-            for m in 2..=S {
-                p = [p[1], p[2], next(m, x, p[2], p[1])];
-            }
-            // (1 - x^2) (P_n - P_(n-1))' from DLMF 18.9.17.
-            let slope = count * (p[1] - x * p[2]) - (count - one) * (p[0] - x * p[1]);
-            x = x - (p[2] - p[1]) * (one - x * x) / slope;
+            let [(last, slope), (before, slope_before)] = [S, S - 1].map(|n| legendre(n, x));
+            x = x - (last - before) / (slope - slope_before);
         }
         half * (one + x)
     })
@@ -135,7 +130,8 @@ fn make() -> Radau {
     let n = NODES as f64;
     let u = nodes::<NODES>();
     let nodes = u.map(|u| u + u - one);
-    let polynomials = nodes.map(legendre);
+    // P_0 to P_n at the nodes.
+    let polynomials = nodes.map(|x| std::array::from_fn::<_, { NODES + 1 }, _>(|m| legendre(m, x).0));
     let count = DoubleDouble::new(n * n);
     let mut rule = Radau {
         u: [0.0; NODES],
@@ -185,20 +181,4 @@ fn make() -> Radau {
         rule.slopes_at_0[k] = -rule.barycentric[k] / rule.barycentric[NODES] / rule.u[k];
     }
     rule
-}
-
-/// `P_0 … P_n`.
-fn legendre(x: DoubleDouble) -> [DoubleDouble; NODES + 1] {
-    let mut p = [DoubleDouble::new(1.0); NODES + 1];
-    p[1] = x;
-    for m in 2..=NODES {
-        p[m] = next(m, x, p[m - 1], p[m - 2]);
-    }
-    p
-}
-
-/// `P_m` from the two preceding polynomials (DLMF 18.9.1).
-fn next(m: usize, x: DoubleDouble, last: DoubleDouble, before: DoubleDouble) -> DoubleDouble {
-    let k = m as f64;
-    (DoubleDouble::new(2.0 * k - 1.0) * x * last - DoubleDouble::new(k - 1.0) * before) / DoubleDouble::new(k)
 }
