@@ -150,11 +150,8 @@ impl SteadySliding {
     fn growth_bound(&self) -> f64 {
         let SteadySliding { inertia, sum, c, hurwitz, .. } = *self;
         let (square, slope) = (2.0 * inertia * sum, sum * sum + c * inertia);
-        if slope > 0.0 {
-            let by_slope = -hurwitz / slope;
-            return if square * by_slope > slope { (-hurwitz / square).sqrt() } else { by_slope };
-        }
-        (-slope + (slope * slope - 4.0 * square * hurwitz).sqrt()) / (2.0 * square)
+        let root = (slope * slope - 4.0 * square * hurwitz).sqrt();
+        if slope > 0.0 { -2.0 * hurwitz / (slope + root) } else { (root - slope) / (2.0 * square) }
     }
 
     /// `P^2/4 - Q` in double-double: near a double root it is a small difference. `P` follows from the sum of the
