@@ -3,7 +3,7 @@
 use slipsweep::model::StateLaw;
 use slipsweep::numerics::elementary::exp;
 use slipsweep::numerics::stiff::{Accuracy, Collocation, Integrator, Linearised, Points, System, radau_iia_9};
-use slipsweep::stability::step_response::{IntegrationStep, ScaledBlock, State, step_to};
+use slipsweep::stability::step_response::{ScaledBlock, State, step_to};
 
 /// Index of `ln(v/v_f)` in a [`State`].
 const X: usize = 2;
@@ -165,8 +165,8 @@ fn follow_response(k: f64, t_end: f64, tolerance: f64) -> (State, usize, [u32; 2
             run.jump(arrested, slider.first_step(&arrested));
         }
         let step = step_to(&mut run, t_end).expect("goes on");
-        counts[usize::from(matches!(step, IntegrationStep::Implicit(_)))] += 1;
-        let values: Vec<f64> = (0..=8).map(|i| step.value(X, f64::from(i) / 8.0)).collect();
+        counts[usize::from(step.is_implicit)] += 1;
+        let values: Vec<f64> = (0..=8).map(|i| step.path.value(X, f64::from(i) / 8.0)).collect();
         rises += values.windows(2).filter(|pair| pair[0] < 0.0 && pair[1] >= 0.0).count();
     }
     (*run.y(), rises, counts)

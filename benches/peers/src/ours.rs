@@ -24,7 +24,7 @@ impl Method for Switching {
             }
             let step = step_to(&mut run, case.t_end)?;
             if let Some(peaks) = &mut peaks {
-                peaks.look(|u| step.value(X, u));
+                peaks.look(|u| step.path.value(X, u));
             }
         }
         Some(*run.y())

@@ -42,6 +42,24 @@ impl<const N: usize, const S: usize> DenseOutput<N, S> {
         dense_output
     }
 
+    /// The same polynomial as one of a degree `P` above `S`.
+    #[inline(always)]
+    pub fn raised<const P: usize>(&self) -> DenseOutput<N, P> {
+        let &DenseOutput { t, h, start, end, powers } = self;
+        DenseOutput {
+            t,
+            h,
+            start,
+            end,
+            powers: powers.map(|row| std::array::from_fn(|k| if k < S { row[k] } else { 0.0 })),
+        }
+    }
+
+    /// Time at `u`.
+    pub fn time(&self, u: f64) -> f64 {
+        self.t + u * self.h
+    }
+
     /// The part of the polynomial between two fractions of the step, as a step of its own.
     pub fn between(&self, from: f64, to: f64) -> Self {
         let mut powers = self.powers;

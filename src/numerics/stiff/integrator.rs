@@ -170,7 +170,12 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
     /// Integrates the part of an accepted step between the fractions `from` and `to` again: its end has the order of the method, and its polynomial
     /// is closer to the solution. `None` if Newton's method fails.
     #[inline(always)]
-    pub fn between(&mut self, dense_output: &DenseOutput<N, S>, from: f64, to: f64) -> Option<DenseOutput<N, S>> {
+    pub fn between<const P: usize>(
+        &mut self,
+        dense_output: &DenseOutput<N, P>,
+        from: f64,
+        to: f64,
+    ) -> Option<DenseOutput<N, S>> {
         let DenseOutput { t, start, .. } = *dense_output;
         let start = if from > 0.0 { self.substep(dense_output, (t, start), 0.0, from)?.end } else { start };
         self.substep(dense_output, (t + from * dense_output.h, start), from, to)
@@ -178,9 +183,9 @@ impl<'a, Y: System<N>, const N: usize, const S: usize> Integrator<'a, Y, N, S> {
 
     /// A step from `(t, y)`, at the fraction `from` of a step, to the fraction `to`.
     #[inline(always)]
-    fn substep(
+    fn substep<const P: usize>(
         &mut self,
-        dense_output: &DenseOutput<N, S>,
+        dense_output: &DenseOutput<N, P>,
         (t, y): (f64, [f64; N]),
         from: f64,
         to: f64,

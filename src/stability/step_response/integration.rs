@@ -15,14 +15,13 @@ use crate::numerics::stiff::{Accuracy, DenseOutput, Integrator, radau_iia_9};
 /// Stages of an implicit step: order 9.
 pub const STAGES: usize = 5;
 
-/// Integration step with dense output.
+/// Integration step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "both kinds are as frequent, and live on the stack")]
-pub enum IntegrationStep {
-    /// By Radau IIA: good to order 9 at its end, to order 5 between.
-    Implicit(DenseOutput<3, STAGES>),
-    /// By a Taylor series: good everywhere.
-    Taylor(DenseOutput<3, TERMS>),
+pub struct IntegrationStep {
+    /// The solution over the step.
+    pub path: DenseOutput<3, TERMS>,
+    /// Whether it is by Radau IIA, good to order 9 at its end and to order 5 between, or by a Taylor series, good everywhere.
+    pub is_implicit: bool,
 }
 
 /// Integration along a response.
@@ -92,8 +91,8 @@ impl Integration<'_> {
     #[inline(always)]
     fn step(&mut self, limit: f64) -> Option<IntegrationStep> {
         match self.expand(limit) {
-            Some(step) => Some(IntegrationStep::Taylor(step)),
-            None => self.integrator.step(limit).map(IntegrationStep::Implicit),
+            Some(path) => Some(IntegrationStep { path, is_implicit: false }),
+            None => self.integrator.step(limit).map(IntegrationStep::implicit),
         }
     }
 
@@ -158,55 +157,15 @@ pub fn step_to(run: &mut Integration<'_>, limit: f64) -> Option<IntegrationStep>
 
 /// Substep between two fractions of a step, to the accuracy of a step: an implicit step is repeated. `None` if it fails.
 pub fn substep(run: &mut Integration<'_>, step: &IntegrationStep, from: f64, to: f64) -> Option<IntegrationStep> {
-    match step {
-        IntegrationStep::Implicit(step) => run.integrator.between(step, from, to).map(IntegrationStep::Implicit),
-        IntegrationStep::Taylor(step) => Some(IntegrationStep::Taylor(step.between(from, to))),
+    if step.is_implicit {
+        run.integrator.between(&step.path, from, to).map(IntegrationStep::implicit)
+    } else {
+        Some(IntegrationStep { path: step.path.between(from, to), is_implicit: false })
     }
-}
-
-/// A value of a step of either kind.
-macro_rules! of_step {
-    ($self:ident, $step:ident => $value:expr) => {
-        match $self {
-            IntegrationStep::Implicit($step) => $value,
-            IntegrationStep::Taylor($step) => $value,
-        }
-    };
 }
 
 impl IntegrationStep {
-    /// Time at its start.
-    pub fn t(&self) -> f64 {
-        of_step!(self, step => step.t)
-    }
-
-    /// Duration.
-    pub fn h(&self) -> f64 {
-        of_step!(self, step => step.h)
-    }
-
-    /// Time at the fraction `u` of the step.
-    pub fn time(&self, u: f64) -> f64 {
-        self.t() + u * self.h()
-    }
-
-    /// State at its start.
-    pub fn start(&self) -> &State {
-        of_step!(self, step => &step.start)
-    }
-
-    /// State at its end.
-    pub fn end(&self) -> &State {
-        of_step!(self, step => &step.end)
-    }
-
-    /// Variable `r` at the fraction `u` of the step.
-    pub fn value(&self, r: usize, u: f64) -> f64 {
-        of_step!(self, step => step.value(r, u))
-    }
-
-    /// Time derivative of variable `r` at the fraction `u` of the step.
-    pub fn slope(&self, r: usize, u: f64) -> f64 {
-        of_step!(self, step => step.slope(r, u))
+    fn implicit(path: DenseOutput<3, STAGES>) -> IntegrationStep {
+        IntegrationStep { path: path.raised(), is_implicit: true }
     }
 }

@@ -35,7 +35,7 @@ impl MotionInterval {
     /// Time, in `l/v_f`, and state at the fraction `u` of the interval.
     fn at(&self, u: f64) -> (f64, State) {
         match self {
-            MotionInterval::Integrated(step) => (step.time(u), std::array::from_fn(|r| step.value(r, u))),
+            MotionInterval::Integrated(step) => (step.path.time(u), std::array::from_fn(|r| step.path.value(r, u))),
             MotionInterval::Arrest { t, from, to } => (*t, std::array::from_fn(|r| from[r] + u * (to[r] - from[r]))),
         }
     }
@@ -73,7 +73,7 @@ impl StepResponseMotion {
         let step_work = |step: &IntegrationStep| {
             let at = |x: f64| self.moment(MotionInterval::Integrated(*step).at(0.5 * (1.0 + x)));
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
-            0.5 * step.h() / self.v_f * power
+            0.5 * step.path.h / self.v_f * power
         };
         let works = self.intervals.iter().filter_map(|interval| match interval {
             MotionInterval::Integrated(step) => Some(step_work(step)),

@@ -163,7 +163,7 @@ impl<'a> Orbit<'a> {
             }
             let step = step_to(&mut self.run, f64::MAX).ok_or(StopReason::BlowUp)?;
             self.scan(&step);
-            self.elapsed += step.h();
+            self.elapsed += step.path.h;
         }
     }
 
@@ -180,18 +180,18 @@ impl<'a> Orbit<'a> {
     /// Finds extrema and crossings within a step, from node to node.
     fn scan(&mut self, step: &IntegrationStep) {
         let mut u0 = 0.0;
-        let (mut x0, mut slope0) = (step.start()[X], step.slope(X, 0.0));
+        let (mut x0, mut slope0) = (step.path.start[X], step.path.slope(X, 0.0));
         if self.slope * slope0 < 0.0 {
             // Between two steps, whose polynomials differ slightly in slope.
-            self.note_extremum(self.slope, RoughExtremum { rough: Extremum { x: x0, t: step.t() }, position: None });
+            self.note_extremum(self.slope, RoughExtremum { rough: Extremum { x: x0, t: step.path.t }, position: None });
         }
         for u1 in radau_iia_9().nodes {
-            let (x1, slope1) = (step.value(X, u1), step.slope(X, u1));
+            let (x1, slope1) = (step.path.value(X, u1), step.path.slope(X, u1));
             if slope0 * slope1 < 0.0 {
-                let turn = crossing(|u| step.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
-                let x = step.value(X, turn);
+                let turn = crossing(|u| step.path.slope(X, u), [u0, u1], [slope0, slope1], 1e-6 * (u1 - u0));
+                let x = step.path.value(X, turn);
                 self.scan_monotone(step, [u0, turn], [x0, x]);
-                let rough = Extremum { x, t: step.time(turn) };
+                let rough = Extremum { x, t: step.path.time(turn) };
                 self.note_extremum(slope0, RoughExtremum { rough, position: Some((*step, turn)) });
                 self.scan_monotone(step, [turn, u1], [x, x1]);
             } else {
@@ -225,7 +225,7 @@ impl<'a> Orbit<'a> {
 
     /// Finds crossings within a range of a step in which the velocity is monotone.
     fn scan_monotone(&mut self, step: &IntegrationStep, u: [f64; 2], x: [f64; 2]) {
-        let at = |level: f64| crossing(|u| step.value(X, u) - level, u, [x[0] - level, x[1] - level], 1e-9);
+        let at = |level: f64| crossing(|u| step.path.value(X, u) - level, u, [x[0] - level, x[1] - level], 1e-9);
         let (rises, falls) = (x[0] < 0.0 && x[1] >= 0.0, x[0] > 0.0 && x[1] <= 0.0);
         if rises {
             let cycle = self.end_cycle(step, at(0.0));
@@ -244,7 +244,7 @@ impl<'a> Orbit<'a> {
     /// The cycle that ends at the section, near the fraction `u` of a step.
     fn end_cycle(&mut self, step: &IntegrationStep, u: f64) -> Cycle {
         let (end, t, refined_step) = self.locate(step, u, 0.0);
-        let time = refined_step.map_or(u * step.h(), |refined_step| refined_step.h());
+        let time = refined_step.map_or(u * step.path.h, |refined_step| refined_step.path.h);
         let cycle =
             Cycle { end: [end[Z], end[Y], 0.0], t, period: self.elapsed + time, extrema: [self.low, self.high] };
         // The caller adds the whole step.
@@ -255,13 +255,13 @@ impl<'a> Orbit<'a> {
     /// State and time where `x` is `level`, near the fraction `u` of a step, to the order of the method.
     fn locate(&mut self, step: &IntegrationStep, u: f64, level: f64) -> (State, f64, Option<IntegrationStep>) {
         let mut u = u;
-        let mut best = (std::array::from_fn(|r| step.value(r, u)), step.time(u), None);
+        let mut best = (std::array::from_fn(|r| step.path.value(r, u)), step.path.time(u), None);
         for _ in 0..2 {
             let Some(refined_step) = substep(&mut self.run, step, 0.0, u) else { break };
-            best = (*refined_step.end(), refined_step.time(1.0), Some(refined_step));
-            let change = (level - refined_step.end()[X]) / refined_step.slope(X, 1.0);
-            u += change / step.h();
-            if change.abs() <= 1e-12 * step.h() || !(u > 0.0 && u < 1.5) {
+            best = (refined_step.path.end, refined_step.path.time(1.0), Some(refined_step));
+            let change = (level - refined_step.path.end[X]) / refined_step.path.slope(X, 1.0);
+            u += change / step.path.h;
+            if change.abs() <= 1e-12 * step.path.h || !(u > 0.0 && u < 1.5) {
                 break;
             }
         }
@@ -274,14 +274,14 @@ impl<'a> Orbit<'a> {
         for _ in 0..2 {
             let (from, to) = ((u - POLISH_WINDOW).max(0.0), u + POLISH_WINDOW);
             let Some(refined_step) = substep(&mut self.run, &step, from, to) else { return rough };
-            let slopes = [refined_step.slope(X, 0.0), refined_step.slope(X, 1.0)];
+            let slopes = [refined_step.path.slope(X, 0.0), refined_step.path.slope(X, 1.0)];
             if slopes[0] * slopes[1] >= 0.0 {
                 break;
             }
-            (step, u) = (refined_step, crossing(|u| refined_step.slope(X, u), [0.0, 1.0], slopes, 1e-9));
+            (step, u) = (refined_step, crossing(|u| refined_step.path.slope(X, u), [0.0, 1.0], slopes, 1e-9));
         }
         substep(&mut self.run, &step, 0.0, u)
-            .map_or(rough, |refined_step| Extremum { x: refined_step.end()[X], t: refined_step.time(1.0) })
+            .map_or(rough, |refined_step| Extremum { x: refined_step.path.end[X], t: refined_step.path.time(1.0) })
     }
 
     /// Minimum and maximum of the velocity since the last section, if there are any.
