@@ -1,12 +1,14 @@
 //! A response over time.
 
-use super::integration::{IntegrationStep, step_to};
+use super::integration::step_to;
 use super::long_term::STEP_ERROR;
 use super::scaled_block::{State, X, Y};
+use super::series::TERMS;
 use super::{ScaledStep, VelocityStep};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln};
 use crate::numerics::gauss::{SHORT_NODES, rule};
+use crate::numerics::stiff::DenseOutput;
 use crate::protocol::{Moment, Motion, equal_landmarks, interval_at};
 
 /// Intervals of a traced response, at most. Chosen: a limit of memory, far beyond the resolution of a picture.
@@ -21,24 +23,14 @@ pub struct StepResponseMotion {
     intervals: Vec<MotionInterval>,
 }
 
-/// Interval of a response.
-#[derive(Debug, Clone, Copy)]
-#[expect(clippy::large_enum_variant, reason = "arrests are few")]
-enum MotionInterval {
-    /// A step of the integrator.
-    Integrated(IntegrationStep),
-    /// An arrest that takes no time.
-    Arrest { t: f64, from: State, to: State },
-}
+/// Step of the integrator, or an arrest that takes no time; time in `l/v_f`.
+type MotionInterval = DenseOutput<3, TERMS>;
 
-impl MotionInterval {
-    /// Time, in `l/v_f`, and state at the fraction `u` of the interval.
-    fn at(&self, u: f64) -> (f64, State) {
-        match self {
-            MotionInterval::Integrated(step) => (step.path.time(u), std::array::from_fn(|r| step.path.value(r, u))),
-            MotionInterval::Arrest { t, from, to } => (*t, std::array::from_fn(|r| from[r] + u * (to[r] - from[r]))),
-        }
-    }
+/// An arrest at a time.
+fn arrest(t: f64, from: State, to: State) -> MotionInterval {
+    let mut powers = [[0.0; TERMS]; 3];
+    (0..3).for_each(|r| powers[r][0] = to[r] - from[r]);
+    DenseOutput::from_powers(t, 0.0, from, powers)
 }
 
 impl VelocityStep {
@@ -54,10 +46,10 @@ impl VelocityStep {
         let end = t_f * v_f;
         while run.t() < end {
             if let Some(arrested) = slider.arrest(run.y()) {
-                intervals.push(MotionInterval::Arrest { t: run.t(), from: *run.y(), to: arrested });
+                intervals.push(arrest(run.t(), *run.y(), arrested));
                 run.jump(arrested, slider.first_step(&arrested));
             }
-            intervals.push(MotionInterval::Integrated(step_to(&mut run, end)?));
+            intervals.push(step_to(&mut run, end)?.path);
             if intervals.len() > MAX_INTERVALS {
                 return None;
             }
@@ -70,32 +62,28 @@ impl StepResponseMotion {
     /// Work of friction up to the end, `int tau v dt`, in scaled units.
     pub fn work(&self) -> f64 {
         let rule = rule(SHORT_NODES);
-        let step_work = |step: &IntegrationStep| {
-            let at = |x: f64| self.moment(MotionInterval::Integrated(*step).at(0.5 * (1.0 + x)));
+        let work = |interval: &MotionInterval| {
+            let at = |x: f64| self.moment(interval, 0.5 * (1.0 + x));
             let power: f64 = rule.x.iter().zip(&rule.w).map(|(&x, w)| w * at(x).friction * at(x).v).sum();
-            0.5 * step.path.h / self.v_f * power
+            0.5 * interval.h / self.v_f * power
         };
-        let works = self.intervals.iter().filter_map(|interval| match interval {
-            MotionInterval::Integrated(step) => Some(step_work(step)),
-            MotionInterval::Arrest { .. } => None,
-        });
-        works.sum()
+        self.intervals.iter().map(work).sum()
     }
 
     /// Least velocity at the nodes and the ends of all intervals, in `v_0`.
     pub fn least_velocity(&self) -> f64 {
         let rule = rule(SHORT_NODES);
         let fractions = || rule.x.iter().map(|x| 0.5 * (1.0 + x)).chain([0.0, 1.0]);
-        let least = |interval: &MotionInterval| {
-            fractions().map(|u| self.moment(interval.at(u)).v).fold(f64::INFINITY, f64::min)
-        };
+        let least =
+            |interval: &MotionInterval| fractions().map(|u| self.moment(interval, u).v).fold(f64::INFINITY, f64::min);
         self.intervals.iter().map(least).fold(f64::INFINITY, f64::min)
     }
 
-    fn moment(&self, (t, state): (f64, State)) -> Moment {
-        let (ln_v, ln_theta) = (state[X] + ln(self.v_f), state[Y] - ln(self.v_f));
+    /// State at the fraction `u` of an interval.
+    fn moment(&self, interval: &MotionInterval, u: f64) -> Moment {
+        let (ln_v, ln_theta) = (interval.value(X, u) + ln(self.v_f), interval.value(Y, u) - ln(self.v_f));
         Moment {
-            t: t / self.v_f,
+            t: interval.time(u) / self.v_f,
             v: exp(ln_v),
             theta: exp(ln_theta),
             friction: 1.0 + self.law.a * ln_v + self.law.b * ln_theta,
@@ -116,7 +104,7 @@ impl Motion for StepResponseMotion {
 
     fn at(&self, s: f64) -> Moment {
         let (k, u) = interval_at(s, self.intervals.len());
-        self.moment(self.intervals[k].at(u))
+        self.moment(&self.intervals[k], u)
     }
 
     fn arrives(&self) -> bool {
