@@ -150,36 +150,24 @@ impl Rates {
     /// Rates at `y` and `x` under a law.
     #[inline(always)]
     pub fn of(state_law: StateLaw, y: f64, x: f64) -> Rates {
-        match state_law {
-            StateLaw::Ageing => Rates::ageing(y, x),
-            StateLaw::Slip => Rates::slip(y, x),
-            StateLaw::Prz => Rates::prz(y, x),
-        }
-    }
-
-    #[inline(always)]
-    fn ageing(y: f64, x: f64) -> Rates {
-        let ((v, excess), (ageing, surplus)) = (exp_and_m1(x), exp_and_m1(-y));
-        // Far from 1 the difference with 1 would lose digits.
-        let near = excess.abs() < 0.5 && surplus.abs() < 0.5;
-        let growth = if near { surplus - excess } else { ageing - v };
-        Rates { v, excess, growth, relaxation: ageing, by_x: -v }
-    }
-
-    #[inline(always)]
-    fn slip(y: f64, x: f64) -> Rates {
         let (v, excess) = exp_and_m1(x);
         let q = x + y;
-        Rates { v, excess, growth: -v * q, relaxation: v, by_x: -v * (1.0 + q) }
-    }
-
-    #[inline(always)]
-    fn prz(y: f64, x: f64) -> Rates {
-        let (v, excess) = exp_and_m1(x);
-        let healing = exp(-y);
-        let (square, surplus) = exp_and_m1(2.0 * (x + y));
-        let relaxation = 0.5 * healing * (1.0 + square);
-        Rates { v, excess, growth: -0.5 * healing * surplus, relaxation, by_x: -healing * square }
+        match state_law {
+            StateLaw::Ageing => {
+                let (ageing, surplus) = exp_and_m1(-y);
+                // Far from 1 the difference with 1 would lose digits.
+                let near = excess.abs() < 0.5 && surplus.abs() < 0.5;
+                let growth = if near { surplus - excess } else { ageing - v };
+                Rates { v, excess, growth, relaxation: ageing, by_x: -v }
+            }
+            StateLaw::Slip => Rates { v, excess, growth: -v * q, relaxation: v, by_x: -v * (1.0 + q) },
+            StateLaw::Prz => {
+                let healing = exp(-y);
+                let (square, surplus) = exp_and_m1(2.0 * q);
+                let relaxation = 0.5 * healing * (1.0 + square);
+                Rates { v, excess, growth: -0.5 * healing * surplus, relaxation, by_x: -healing * square }
+            }
+        }
     }
 }
 
