@@ -18,6 +18,7 @@ use super::integration::STAGES as S;
 use super::long_term::{Follower, excess};
 use super::orbit::{Orbit, StopReason};
 use super::scaled_block::SectionPoint;
+use super::simulation::ACCURACIES;
 use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::crossing;
@@ -62,10 +63,6 @@ const SYSTEM: usize = 2 * S;
 /// Width of a limit cycle, in `ln v`, at least. Chosen: ten times the motion by rounding of the force in the physical
 /// domain.
 const MIN_CYCLE: f64 = 1e-7;
-
-/// Error of the least velocity of a limit cycle, in units of `rtol`, at most; above it the velocity is unknown. Chosen: two
-/// runs still agree.
-const TROUGH_ERROR: f64 = 0.3;
 
 /// Difference of section points for the derivative of the map. Derived: the power 1/3 of the error of a cycle at `rtol`
 /// 1e-6.
@@ -280,13 +277,14 @@ impl Follower<'_> {
             if ends || stops {
                 // Error from a fraction of the last change, and from errors of steps.
                 let left = (map_step.range[0] - trough).abs() * (0.01 + 0.1 * noise / distance);
-                if left > TROUGH_ERROR * self.requested_rtol && !is_exact {
-                    is_exact = true;
-                    map_step = self.map_step(map_step.from, self.map_tolerance(map_step.range, 0.0))?;
-                    before = NEWTON_RADIUS;
-                    continue;
-                }
-                if left > TROUGH_ERROR * self.requested_rtol {
+                // The error of the second run.
+                if left > ACCURACIES[1] * self.requested_rtol {
+                    if !is_exact {
+                        is_exact = true;
+                        map_step = self.map_step(map_step.from, self.map_tolerance(map_step.range, 0.0))?;
+                        before = NEWTON_RADIUS;
+                        continue;
+                    }
                     map_step.range[0] = f64::NAN;
                 }
                 let is_certain = noise < NEWTON_RADIUS && map_step.size() > MIN_CYCLE && self.is_driven();

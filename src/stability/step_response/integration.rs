@@ -6,6 +6,7 @@
 
 use multiversion::multiversion;
 
+use super::long_term::STEP_ERROR;
 use super::scaled_block::{Rates, ScaledBlock, State, X, Y};
 use super::series::{Powers, TERMS, reach};
 use crate::numerics::MAX_STEPS;
@@ -51,15 +52,12 @@ const IMPLICIT_FROM: f64 = 15.0;
 /// of the physical domain.
 const SHORTEST_SLIP: f64 = 1e-120;
 
-/// Error of an implicit step, fraction of the tolerance. Chosen: an error of theta in a stick phase becomes an error of the
-/// time of the next slip, and accuracy costs least there.
-const IMPLICIT_ERROR: f64 = 0.03;
-
 impl ScaledBlock {
     /// Integration from `state`, with errors of a step below `tolerance` in `x`, `y` and `z/force`.
     pub fn run(&self, state: State, h: f64, tolerance: f64) -> Integration<'_> {
         let accuracy = Accuracy { tolerance, scale: [self.force(), 1.0, 1.0] };
-        let implicit = Accuracy { tolerance: IMPLICIT_ERROR * tolerance, ..accuracy };
+        // An error of theta in a stick phase becomes an error of the time of the next slip, and accuracy costs least there.
+        let implicit = Accuracy { tolerance: STEP_ERROR * tolerance, ..accuracy };
         let mut integrator = Integrator::new(self, radau_iia_9(), implicit, 0.0, state, h);
         if self.inertia > 0.0 || self.k > self.b - self.a {
             integrator.may_step(SHORTEST_SLIP);

@@ -20,12 +20,12 @@ pub(super) struct LinearStability {
 /// Steps of one run, at most. Chosen: some ten times those of a response that envelope following decides.
 pub(super) const MAX_STEPS: u32 = 100_000;
 
-/// Error of a step, fraction of the error of a run, and distance from the limit cycle, fraction of `rtol`. Chosen: the errors of the thirty-odd steps of
-/// a slip add up.
+/// Error of a step, fraction of the error of a run, and of an implicit step, fraction of that; distance from the limit cycle, fraction of `rtol`.
+/// Chosen: the errors of the thirty-odd steps of a slip add up.
 pub(super) const STEP_ERROR: f64 = 0.03;
 
-/// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
-const DENSE_OUTPUT_ERROR: f64 = 1e-2;
+/// Error of `ln(v/v_f)` at an extremum of the dense output, absolute and relative, at most. Measured at the loosest tolerance.
+pub(super) const DENSE_OUTPUT_ERROR: f64 = 1e-2;
 
 /// Error estimate of a step, fraction of the motion, at most. Chosen: an estimate as large as the motion allows steps that
 /// damp a growing motion.
