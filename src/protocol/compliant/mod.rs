@@ -17,7 +17,8 @@ mod path;
 
 use super::control::{Tolerance, ValueRange};
 use super::profile::{
-    ArrivalProblem, Hermite, InitialState, ProtocolEnd, ResolvedPanel, VelocityCurve, WorkAndFriction, integrate_theta,
+    ArrivalProblem, Hermite, InitialState, ProtocolEnd, ResolvedPanel, ResolvedProfile, VelocityCurve, WorkAndFriction,
+    integrate_theta,
 };
 use super::{Solved, SolverStats, SpringBlock, Status};
 use crate::model::Transition;
@@ -91,7 +92,7 @@ pub fn path(slider: &SpringBlock, (v_i, v_f): (f64, f64), t_f: f64, rtol: f64) -
     let mut panels = Vec::new();
     let mut stats = SolverStats::default();
     let curve = follow(slider, (v_i, v_f), t_f, rtol, &mut stats, |_, panel| panels.push(*panel))?;
-    Ok(CompliantPath::new(*slider, curve, panels))
+    Ok(CompliantPath { slider: *slider, resolution: ResolvedProfile { law: slider.law, curve, panels } })
 }
 
 /// Finds the shortcut, and integrates theta along it.

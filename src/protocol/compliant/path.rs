@@ -1,24 +1,16 @@
 //! The compliant shortcut over time, with the control velocity that drives it.
 
-use crate::protocol::profile::{Hermite, ResolvedPanel, ResolvedProfile, VelocityCurve};
+use crate::protocol::profile::{Hermite, ResolvedPanel, ResolvedProfile};
 use crate::protocol::{Jet, Moment, Motion, SpringBlock, interval_at};
 
 /// The shortcut in consecutive panels; it is smooth on the scale of a panel.
 pub struct CompliantPath {
     /// The block on its spring.
     pub slider: SpringBlock,
-    resolution: ResolvedProfile<Hermite>,
-    /// Times at which panels begin, and the end.
-    times: Vec<f64>,
+    pub(super) resolution: ResolvedProfile<Hermite>,
 }
 
 impl CompliantPath {
-    pub(super) fn new(slider: SpringBlock, curve: VelocityCurve<Hermite>, panels: Vec<ResolvedPanel>) -> CompliantPath {
-        let mut times: Vec<f64> = panels.iter().map(|panel| curve.t_f * panel.x_and_z(0.0).0).collect();
-        times.push(curve.t_f);
-        CompliantPath { slider, resolution: ResolvedProfile { law: slider.law, curve, panels }, times }
-    }
-
     /// Number of panels.
     pub fn panels(&self) -> usize {
         self.resolution.panels.len()
@@ -41,8 +33,10 @@ impl CompliantPath {
 
     /// State at a time, clamped to `[0, t_f]`.
     pub fn at_time(&self, t: f64) -> Jet {
-        let panel = self.times.partition_point(|&start| start <= t).clamp(1, self.panels()) - 1;
-        let u = (t - self.times[panel]) / self.panel_duration(panel);
+        let ResolvedProfile { curve, panels, .. } = &self.resolution;
+        let start = |panel: &ResolvedPanel| curve.t_f * panel.x_and_z(0.0).0;
+        let panel = panels.partition_point(|panel| start(panel) <= t).max(1) - 1;
+        let u = (t - start(&panels[panel])) / self.panel_duration(panel);
         self.jet(panel, u.clamp(0.0, 1.0))
     }
 }
