@@ -10,7 +10,7 @@ use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, r
 use crate::numerics::{ROUNDING_RTOL, TIGHT_RTOL};
 use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::{Motion, SpringBlock};
-use crate::stability::OpenLoopResult;
+use crate::stability::{COARSENING, OpenLoopResult};
 
 /// Samples of one simulation, at most. Chosen: each takes some steps; more would take minutes a row.
 const MAX_SAMPLES: u32 = 100_000;
@@ -49,7 +49,7 @@ pub fn held_error(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, dt: f6
     // Where errors grow, the shift of the control grows with them; steps may stay on an unstable motion by symmetry.
     let shift = (SHIFT * rtol).max(ROUNDING_RTOL);
     let number = distance(rtol, 1.0, shift).and_then(|shifted| {
-        let distance = distance(FINER * rtol, PARTS, 0.0)?;
+        let distance = distance(rtol / COARSENING, PARTS, 0.0)?;
         ((shifted - distance).abs() <= rtol * (1.0 + distance)).then_some(distance)
     });
     OpenLoopResult { number, steps }
@@ -94,9 +94,6 @@ fn held_distance(
 /// Accuracy of the shortcut, and error of a step, as fractions of `rtol`. Chosen: the acceleration, which the control contains, has two digits less than
 /// the velocity, and the errors of a hundred steps may add up.
 const FRACTION: f64 = 0.01;
-
-/// Tolerance of the second simulation, relative to the first. Chosen: its error is that of the first to a digit.
-const FINER: f64 = 0.1;
 
 /// Parts of a sampling interval in the second simulation. Chosen: it resolves a relaxation that one step of the first crosses.
 const PARTS: f64 = 8.0;

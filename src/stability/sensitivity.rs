@@ -11,7 +11,7 @@
 //! `dy' = -dy/theta`. The decay rate `kappa` spans many decades: collocation at the Radau nodes damps fast modes and
 //! resolves slow ones.
 
-use nalgebra::{DMatrix, DVectorView, Matrix3};
+use nalgebra::{DMatrix, Matrix3};
 
 use crate::numerics::elementary::exp;
 use crate::numerics::radau::{NODES, Radau, radau, root_of_order};
@@ -19,7 +19,7 @@ use crate::numerics::{LONG_ROUNDING_RTOL, MIN_INVERTIBLE, TIGHT_RTOL};
 use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::error::TIGHTEST_RTOL;
 use crate::protocol::{Jet, SpringBlock};
-use crate::stability::OpenLoopResult;
+use crate::stability::{COARSENING, OpenLoopResult};
 
 /// Amplification of a small error of the state from start to end of the shortcut from `v_i` to `v_f` in `t_f`: the largest singular value of the
 /// fundamental matrix.
@@ -98,9 +98,6 @@ fn growth(path: &CompliantPath, tolerance: f64, count: &mut u32) -> Option<f64> 
 /// Steps of the linearised flow, at most. Chosen: enough for some thousand oscillations.
 const MAX_STEPS: u32 = 3_000;
 
-/// Tolerance of the first run, in units of that of the second. Chosen: its steps differ, so that rounding differs, too.
-const COARSENING: f64 = 10.0;
-
 /// Factor of an error in one step, at least. Derived: rounding relative to the start of a step is then below the default `rtol` of its end by three
 /// digits.
 const MIN_STEP_FACTOR: f64 = 1e-3;
@@ -149,8 +146,8 @@ fn step(
     let next = values.rows((NODES - 1) * n, n).into_owned();
     let mut error = 0.0f64;
     for column in 0..n {
-        let largest = length(&next.column(column));
-        if largest < MIN_STEP_FACTOR * length(&flow.column(column)) {
+        let largest = next.column(column).amax();
+        if largest < MIN_STEP_FACTOR * flow.column(column).amax() {
             return Some((next, 1.0));
         }
         for i in 0..n {
@@ -178,10 +175,4 @@ fn rates(slider: &SpringBlock, jet: &Jet) -> Matrix3<f64> {
     } else {
         Matrix3::new(ratio * v - aging, -v, 0.0, ratio * pull, -pull, 0.0, 0.0, 0.0, 0.0)
     }
-}
-
-/// Euclidean norm, scaled against overflow.
-fn length(column: &DVectorView<'_, f64>) -> f64 {
-    let largest = column.amax();
-    if largest == 0.0 || !largest.is_finite() { largest } else { largest * (column / largest).norm() }
 }
