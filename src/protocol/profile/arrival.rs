@@ -183,45 +183,6 @@ impl<E: Exponent> ArrivalProblem<E> {
         }
         Some(sums)
     }
-
-    #[inline(always)]
-    fn add<const BY_LOSS: bool>(
-        &self,
-        curve: &VelocityCurve<E>,
-        panel: &CurvePanel,
-        rule: &Radau,
-        sums: &mut BackwardIntegrals,
-    ) {
-        let (x, z) = x_and_z_at_nodes(panel, rule);
-        let (w, excess) = curve.above_floor_at_nodes(&x, &z);
-        let h = curve.t_f * (panel.to - panel.from).abs();
-        let (mut v, mut sensitivity) = ([0.0; NODES], [0.0; NODES]);
-        for j in 0..NODES {
-            v[j] = h * (curve.floor + w[j]);
-            sensitivity[j] = E::sensitivity(x[j], z[j]) * w[j];
-        }
-        let slip = rule.integrals(&v);
-        let slip_by_c = rule.integrals(&sensitivity);
-        let (mut sum, mut slope) = ([0.0; NODES], [0.0; NODES]);
-        for j in 0..NODES {
-            let weight = h * rule.w[j] * exp(-(sums.slip + slip[j]));
-            let q = sums.slip_by_c + h * slip_by_c[j];
-            if BY_LOSS {
-                let part = weight * w[j] * self.aged(curve.t_f * x[j]);
-                sum[j] = part;
-                slope[j] = part * (q - E::sensitivity(x[j], z[j]));
-            } else {
-                let missing = self.pull - excess[j];
-                sum[j] = weight * missing;
-                slope[j] = weight * (sensitivity[j] + q * missing);
-            }
-        }
-        sums.v = curve.floor + w[NODES - 1];
-        sums.slip += slip[NODES - 1];
-        sums.slip_by_c += h * slip_by_c[NODES - 1];
-        sums.sum += total(&sum);
-        sums.slope += total(&slope);
-    }
 }
 
 /// Theta at the end, fraction of `theta_1` or of `theta_b`, at least. Chosen: six digits are lost there.
@@ -256,9 +217,37 @@ fn add<E: Exponent>(
     rule: &Radau,
     sums: &mut BackwardIntegrals,
 ) {
-    if problem.by_loss {
-        problem.add::<true>(curve, panel, rule, sums);
-    } else {
-        problem.add::<false>(curve, panel, rule, sums);
+    let (x, z) = x_and_z_at_nodes(panel, rule);
+    let (w, excess) = curve.above_floor_at_nodes(&x, &z);
+    let h = curve.t_f * (panel.to - panel.from).abs();
+    let (mut v, mut sensitivity) = ([0.0; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        v[j] = h * (curve.floor + w[j]);
+        sensitivity[j] = E::sensitivity(x[j], z[j]) * w[j];
     }
+    let slip = rule.integrals(&v);
+    let slip_by_c = rule.integrals(&sensitivity);
+    let (mut weight, mut q) = ([0.0; NODES], [0.0; NODES]);
+    for j in 0..NODES {
+        weight[j] = h * rule.w[j] * exp(-(sums.slip + slip[j]));
+        q[j] = sums.slip_by_c + h * slip_by_c[j];
+    }
+    let (mut sum, mut slope) = ([0.0; NODES], [0.0; NODES]);
+    if problem.by_loss {
+        for j in 0..NODES {
+            sum[j] = weight[j] * w[j] * problem.aged(curve.t_f * x[j]);
+            slope[j] = sum[j] * (q[j] - E::sensitivity(x[j], z[j]));
+        }
+    } else {
+        for j in 0..NODES {
+            let missing = problem.pull - excess[j];
+            sum[j] = weight[j] * missing;
+            slope[j] = weight[j] * (sensitivity[j] + q[j] * missing);
+        }
+    }
+    sums.v = curve.floor + w[NODES - 1];
+    sums.slip += slip[NODES - 1];
+    sums.slip_by_c += h * slip_by_c[NODES - 1];
+    sums.sum += total(&sum);
+    sums.slope += total(&slope);
 }
