@@ -105,7 +105,7 @@ fn follow(
     mut visit: impl FnMut(&VelocityCurve<Hermite>, &ResolvedPanel),
 ) -> Result<VelocityCurve<Hermite>, Status> {
     let curve = member(slider, (v_i, v_f), t_f, rtol, stats)?;
-    let ends = (InitialState::steady(v_i, false), 1.0 / v_f);
+    let ends = (InitialState::steady(v_i), 1.0 / v_f);
     let followed = integrate_theta(&curve, ends, rtol, stats, |panel| visit(&curve, panel));
     followed.map(|()| curve).ok_or(Status::NotConverged)
 }

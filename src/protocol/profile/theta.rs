@@ -50,14 +50,12 @@ pub struct InitialState {
     pub theta: f64,
     /// `theta'`, accurate where it is small compared with 1.
     pub rate: f64,
-    /// Whether the distance of theta from the slow solution is the [`lag`] of the velocity there.
-    pub slow: bool,
 }
 
 impl InitialState {
     /// Steady sliding at `v`.
-    pub fn steady(v: f64, slow: bool) -> InitialState {
-        InitialState { v, theta: 1.0 / v, rate: 0.0, slow }
+    pub fn steady(v: f64) -> InitialState {
+        InitialState { v, theta: 1.0 / v, rate: 0.0 }
     }
 }
 
@@ -71,9 +69,9 @@ pub fn integrate_theta<E: Exponent>(
     mut visit: impl FnMut(&ResolvedPanel),
 ) -> Option<()> {
     let (rule, panel_variation) = (radau(), E::INTERPOLATION * panel_variation(rtol));
-    let InitialState { mut v, mut theta, mut rate, slow } = start;
-    // Slip since theta last left the slow solution (at the start, or where v changes too fast), and its relative distance.
-    let (mut slip, mut off) = (0.0, if slow { lag(curve, ProtocolEnd::Start, 0.0, v) } else { 1.0 });
+    let InitialState { mut v, mut theta, mut rate } = start;
+    // Slip since theta last left the slow solution: at the start, or where v changes too fast.
+    let mut slip = 0.0;
     let mut count = 0;
     stats.quadratures += 1;
     for range in HALVES {
@@ -81,9 +79,9 @@ pub fn integrate_theta<E: Exponent>(
         while d != range.to {
             let mut panel = curve.panel(&range, d, panel_variation);
             if lag(curve, range.side, d, v) > MAX_LAG {
-                (slip, off) = (0.0, 1.0);
+                slip = 0.0;
             }
-            let forgotten = slip >= ln(off.clamp(rtol, 1.0) / rtol) + 3.0;
+            let forgotten = slip >= ln(1.0 / rtol) + 3.0;
             let last = curve.last(&panel);
             let stiff = forgotten && curve.stiffness(&panel, v, last) > panel_variation;
             panel = if stiff {

@@ -123,7 +123,7 @@ impl SmoothPiece {
         let (fall, pull) = (-growth / end.theta, end.rate / end.theta);
         let problem = ArrivalProblem::between([start.theta, end.theta], fall, pull, spare, curve);
         let curve = curve.with(problem.solve(0.0, rtol, stats).ok_or(Status::NotConverged)?);
-        let from = InitialState { v: start.v[0], theta: start.theta, rate: start.rate, slow: false };
+        let from = InitialState { v: start.v[0], theta: start.theta, rate: start.rate };
         let ends = (from, end.theta);
         let mut piece =
             SmoothPiece { totals: WorkAndFriction::NONE, v: ValueRange::NONE, control: ValueRange::NONE, curve, ends };

@@ -99,7 +99,7 @@ fn follow(
     visit: impl FnMut(&ResolvedPanel),
 ) -> Result<(), Obstacle> {
     let Transition { v_i, v_f, .. } = case.transition;
-    let ends = (InitialState::steady(v_i, true), 1.0 / v_f);
+    let ends = (InitialState::steady(v_i), 1.0 / v_f);
     integrate_theta(curve, ends, rtol, stats, visit).ok_or(Obstacle::NotConverged)
 }
 
