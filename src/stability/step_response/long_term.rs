@@ -218,8 +218,8 @@ impl<'a> Follower<'a> {
     fn cycle(&mut self, segment: &mut OrbitSegment<'_>) -> Result<Cycle, StopReason> {
         let cycle = segment.orbit.cycle(self.linear.stable, &mut self.budget);
         self.t = segment.offset + segment.orbit.t();
-        let extrema = cycle.as_ref().map_or_else(|_| segment.orbit.extrema(), |cycle| cycle.extrema);
-        self.touches_band = segment.orbit.touches().unwrap_or(self.touches_band);
+        let extrema = cycle.as_ref().map_or_else(|_| segment.orbit.extrema, |cycle| cycle.extrema);
+        self.touches_band = segment.orbit.touches.unwrap_or(self.touches_band);
         self.note_extrema(segment, extrema);
         cycle
     }

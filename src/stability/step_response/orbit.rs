@@ -77,15 +77,15 @@ pub struct Orbit<'a> {
     closed: VecDeque<Cycle>,
     /// Slope of `x` at the end of the last step.
     slope: f64,
-    high: Option<RoughExtremum>,
-    low: Option<RoughExtremum>,
+    /// Minimum and maximum of the velocity since the last section, if there are any.
+    pub(super) extrema: [Option<RoughExtremum>; 2],
     /// The last entry into the band of settled velocities; `None` outside.
     entry: Option<BandEntry>,
     /// Accuracy of `x` at an extremum.
     x_error: f64,
     /// Whether the last extremum outside the band, or near its edge, is so near that rounding decides on which side; `None`
     /// if there was no such extremum.
-    touches: Option<bool>,
+    pub(super) touches: Option<bool>,
 }
 
 /// Extremum to the accuracy of the dense output.
@@ -114,8 +114,7 @@ impl<'a> Orbit<'a> {
             met: state[X] == 0.0,
             closed: VecDeque::new(),
             slope: 0.0,
-            high: None,
-            low: None,
+            extrema: [None; 2],
             entry: is_inside(state[X]).then_some(BandEntry { edge: state[X], position: None }),
             x_error,
             touches: None,
@@ -202,7 +201,8 @@ impl<'a> Orbit<'a> {
     /// Records an extremum after a rise or a fall, if `v = v_f` has been reached and the extremum exceeds `v_f` and the one
     /// before: at rest, rounding makes extrema too.
     fn note_extremum(&mut self, slope: f64, seen: RoughExtremum) {
-        let edge = BAND[usize::from(slope > 0.0)];
+        let side = usize::from(slope > 0.0);
+        let (edge, sign) = (BAND[side], [-1.0, 1.0][side]);
         let beyond = seen.rough.x / edge - 1.0;
         if beyond.abs() < DENSE_OUTPUT_ERROR {
             let refined = self.refined(seen).x / edge - 1.0;
@@ -213,8 +213,7 @@ impl<'a> Orbit<'a> {
         } else if beyond > 0.0 {
             self.touches = Some(false);
         }
-        let (kept, sign) = if slope > 0.0 { (&mut self.high, 1.0) } else { (&mut self.low, -1.0) };
-        let out = sign * seen.rough.x;
+        let (kept, out) = (&mut self.extrema[side], sign * seen.rough.x);
         if self.met && out > 0.0 && kept.is_none_or(|kept| out > sign * kept.rough.x) {
             *kept = Some(seen);
         }
@@ -227,7 +226,7 @@ impl<'a> Orbit<'a> {
         if rises {
             let cycle = self.end_cycle(step, at(0.0));
             self.closed.push_back(cycle);
-            (self.high, self.low) = (None, None);
+            self.extrema = [None; 2];
         }
         self.met |= rises || falls;
         if !is_inside(x[1]) {
@@ -242,8 +241,7 @@ impl<'a> Orbit<'a> {
     fn end_cycle(&mut self, step: &IntegrationStep, u: f64) -> Cycle {
         let (end, t, refined_step) = self.locate(step, u, 0.0);
         let time = refined_step.map_or(u * step.path.h, |refined_step| refined_step.path.h);
-        let cycle =
-            Cycle { end: [end[Z], end[Y], 0.0], t, period: self.elapsed + time, extrema: [self.low, self.high] };
+        let cycle = Cycle { end: [end[Z], end[Y], 0.0], t, period: self.elapsed + time, extrema: self.extrema };
         // The caller adds the whole step.
         self.elapsed = -time;
         cycle
@@ -279,16 +277,6 @@ impl<'a> Orbit<'a> {
         }
         substep(&mut self.run, &step, 0.0, u)
             .map_or(rough, |refined_step| Extremum { x: refined_step.path.end[X], t: refined_step.path.time(1.0) })
-    }
-
-    /// Minimum and maximum of the velocity since the last section, if there are any.
-    pub fn extrema(&self) -> [Option<RoughExtremum>; 2] {
-        [self.low, self.high]
-    }
-
-    /// Whether an extremum near the edge of the band leaves the settling time open; `None` if no extremum decides it.
-    pub fn touches(&self) -> Option<bool> {
-        self.touches
     }
 
     /// Time of the last entry into the band of settled velocities; `None` outside the band.
