@@ -59,6 +59,7 @@ pub fn check(written: &mut CheckedRow<'_>, table: &Table, units: &Units, spec: &
             }
         }
     }
+    reduction.gaps.sort_unstable_by(f64::total_cmp);
     let status = reduction.status();
     written.compare_word(STATUS, status.map_or("", Status::name));
     if status != Some(Status::NotConverged) {
@@ -99,29 +100,29 @@ impl Reduction {
         order.into_iter().find(|status| self.statuses[*status as usize] > 0)
     }
 
-    /// Compares the columns of the row. `columns` are those of the cells; the shortcut of least gap has the `coefficients`.
+    /// Compares the columns of the row, with the gaps in order. `columns` are those of the cells; the shortcut of least gap has the `coefficients`.
     fn compare(&self, written: &mut CheckedRow<'_>, table: &Table, columns: &[&str], coefficients: Option<[f64; 2]>) {
         let Reduction { gaps, least, .. } = self;
-        let mut classes = (0..=HISTOGRAM_EDGES.len()).map(|class| {
-            let low = class.checked_sub(1).map_or(f64::NEG_INFINITY, |class| HISTOGRAM_EDGES[class]);
-            (low, HISTOGRAM_EDGES.get(class).copied().unwrap_or(f64::INFINITY))
-        });
+        let (mut edges, mut below) = (HISTOGRAM_EDGES.iter(), 0);
         for column in table.columns().iter().map(|column| column.name) {
             let place = columns.iter().position(|known| *known == column);
             match (column, percentage(column)) {
                 ("shortcuts", _) => written.compare_relative(column, gaps.len() as f64, 1.0),
                 ("alpha_2", _) => written.compare_relative(column, coefficients.map(|[alpha_2, _]| alpha_2), 1.0),
                 ("alpha_3", _) => written.compare_relative(column, coefficients.map(|[_, alpha_3]| alpha_3), 1.0),
-                (_, Some(percentage)) if table.name() == "gap_quantiles" => {
-                    compare_quantile(written, column, percentage, gaps)
+                (_, Some(percentage)) => {
+                    // The least gap that so many shortcuts do not exceed.
+                    let rank = (percentage * gaps.len()).div_ceil(100).max(1);
+                    written.compare(column, gaps.get(rank - 1).copied());
                 }
                 _ if place.is_some() => {
                     written.compare(column, place.and_then(|place| least.as_ref().map(|(_, cells)| cells[place])));
                 }
+                // The classes of the histogram come in order.
                 _ => {
-                    let inside =
-                        |(low, high): (f64, f64)| gaps.iter().filter(|gap| **gap >= low && **gap < high).count();
-                    written.compare_relative(column, classes.next().map(|class| inside(class) as f64), 1.0);
+                    let next = edges.next().map_or(gaps.len(), |edge| gaps.partition_point(|gap| gap < edge));
+                    written.compare_relative(column, (next - below) as f64, 1.0);
+                    below = next;
                 }
             }
         }
@@ -135,18 +136,6 @@ fn percentage(column: &str) -> Option<usize> {
         "gap_max" => Some(100),
         _ => column.strip_prefix("gap_q")?.parse().ok(),
     }
-}
-
-/// Compares a quantile, the least gap that so many shortcuts do not exceed, with the number of lesser gaps.
-fn compare_quantile(written: &mut CheckedRow<'_>, column: &'static str, percentage: usize, gaps: &[f64]) {
-    let Some(quantile) = written.number(column).filter(|_| !gaps.is_empty()) else {
-        return written.demand(column, !gaps.is_empty());
-    };
-    let [below, same] = [|gap: f64, to: f64| gap < to, |gap, to| gap == to]
-        .map(|is: fn(f64, f64) -> bool| gaps.iter().filter(|gap| is(**gap, quantile)).count());
-    let enough = 100 * (below + same) >= percentage * gaps.len();
-    let is_least = below == 0 || 100 * below < percentage * gaps.len();
-    written.judge(column, same > 0 && enough && is_least, "another gap of the landscape");
 }
 
 /// The landscape of a row alone: its transition and time, and the coefficients of the sweep.
