@@ -18,9 +18,6 @@ fn solve(matrix: Matrix3<Number>, right: Vector) -> Vector {
     matrix.lu().solve(&right).unwrap_or_else(|| Vector::from_element(Number::new(f64::NAN, 0.0)))
 }
 
-/// Size of the coefficient, in units of `a/mass`, below which rounding decides its sign. Chosen: a thousand roundings.
-const SIGN_ROUNDING: f64 = 1e-13;
-
 /// A Hopf point: derivatives of the evolution law, material, and scaled mass `m v^2`.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
@@ -109,22 +106,22 @@ impl Point {
         Some(lyapunov(omega, jacobian, [q, p], second, third))
     }
 
-    /// The unit in which rounding is counted: the forms have `1/mass` in them.
+    /// Rounding of the coefficient. Chosen: a hundred roundings of its terms, which have `a/mass` in them.
     fn rounding(&self) -> f64 {
-        if self.mass > 0.0 { self.law.a / self.mass } else { 1.0 }
+        1e-14 * if self.mass > 0.0 { self.law.a / self.mass } else { 1.0 }
     }
 
     /// Compares the first Lyapunov coefficient.
     pub fn compare_coefficient(&self, row: &mut CheckedRow<'_>) {
         let expected = self.coefficient();
-        let noise = 1e-14 * self.rounding() / row.context.rtol;
+        let noise = self.rounding() / row.context.rtol;
         row.compare_relative("first_lyapunov_coefficient", expected, expected.map_or(0.0, f64::abs) + noise);
     }
 
     /// Compares the type of the Hopf point.
     pub fn compare_kind(&self, row: &mut CheckedRow<'_>) {
         match self.coefficient() {
-            Some(l) if l.abs() < SIGN_ROUNDING * self.rounding() => row.miss("Hopf points between the two kinds"),
+            Some(l) if l.abs() < 10.0 * self.rounding() => row.miss("Hopf points between the two kinds"),
             Some(l) => row.compare_word("hopf_type", if l < 0.0 { "supercritical" } else { "subcritical" }),
             None => row.demand("hopf_type", false),
         }

@@ -11,6 +11,12 @@ impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> System<f64, SVector<f64, N>> 
     }
 }
 
+/// Relative tolerance of the integrator.
+const RTOL: f64 = 1e-13;
+
+/// Relative difference of integrated numbers below which rounding decides. Chosen: a hundred times the tolerance.
+pub const UNCLEAR_RTOL: f64 = 100.0 * RTOL;
+
 /// Greatest number of steps of one integration. Chosen: more mean a stiff motion.
 const MAX_STEPS: u32 = 20_000;
 
@@ -31,7 +37,7 @@ pub fn integrate<const N: usize>(
         to,
         length,
         start,
-        1e-13,
+        RTOL,
         1e-15,
         0.9,
         0.0,

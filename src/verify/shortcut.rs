@@ -4,6 +4,7 @@
 use super::checked_row::NEGATIVE;
 use super::motion::Followed;
 use super::open_loop::{self, ControlledProtocol};
+use super::route::UNCLEAR_RTOL;
 use super::task::{Task, min_duration};
 use super::{Checked, CheckedRow, relaxed};
 use crate::model::{StateLaw, Transition};
@@ -311,10 +312,6 @@ fn smooth_cubic(&Case { transition, t_f, .. }: &Case) -> Cubic {
     Cubic::new(&transition, t_f, [0.0, -3.0 * (v_f - v_i) / (v_i * v_f)])
 }
 
-/// Relative distance from 0 below which the sign of a number is unknown. Chosen: a hundred times the tolerance of the integrator
-/// (`route.rs`).
-const SIGN_RTOL: f64 = 1e-11;
-
 /// The bound that leaves the family without a member, from the extreme protocols of the family; `None` where rounding decides.
 fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static str>> {
     let Case { transition: problem, t_f, tau_ceiling } = *case;
@@ -342,8 +339,8 @@ fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static 
     }
     for (bound, room, size) in rooms {
         match room / size {
-            room if room < -SIGN_RTOL => return Some(Some(bound)),
-            room if room > SIGN_RTOL => {}
+            room if room < -UNCLEAR_RTOL => return Some(Some(bound)),
+            room if room > UNCLEAR_RTOL => {}
             _ => return None,
         }
     }

@@ -2,16 +2,12 @@
 
 use super::motion::{Followed, bisect};
 use super::route::integrate;
-use super::{Checked, CheckedRow, hopf};
+use super::{Checked, CheckedRow, MAX_DIFFERENCE_RTOLS, hopf};
 use crate::model::{Law, StateLaw, Transition};
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::SteadySliding;
 use crate::stability::step_response::{Outcome, SETTLED, VelocityStep};
 use crate::table::STATUS;
-
-/// Distance from the edge of the band of settled velocities, in rtol, within which it is undetermined whether an
-/// extremum leaves the band. Chosen: the limit of `verify`.
-const EDGE_RTOLS: f64 = 10.0;
 
 /// Relative overshoot below which its time is not determined. Chosen: the error of the time is `rtol` divided by the overshoot.
 const MIN_OVERSHOOT: f64 = 1e-3;
@@ -258,7 +254,8 @@ fn compare(row: &mut CheckedRow<'_>, step: &VelocityStep, followed: &Followed) {
     row.compare_word("outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
     row.compare_word("stick_slip", if settled.is_some() { "false" } else { "true" });
     if let Some((entry, speed)) = settled {
-        if events.margin > EDGE_RTOLS * rtol {
+        // Nearer to an edge of the band, it is undetermined whether an extremum leaves it.
+        if events.margin > MAX_DIFFERENCE_RTOLS * rtol {
             let scale = entry.t.max(0.1 / (v_f * (1.0 + k / law.a))) + 1.0 / speed;
             row.compare_number("settling_time", entry.t, scale);
         } else {

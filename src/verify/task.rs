@@ -1,7 +1,8 @@
 //! An optimal transition under bounds: which durations and ceilings are feasible.
 
 use super::CheckedRow;
-use super::route::integrate;
+use super::motion::MOTION_RTOL;
+use super::route::{UNCLEAR_RTOL, integrate};
 use crate::model::{Friction, Transition, friction_margin};
 use crate::protocol::optimal::Bounds;
 use crate::protocol::{Motion, Status, arcsinh, optimal};
@@ -20,15 +21,8 @@ pub struct Task {
 /// Least and greatest feasible time, or the ceiling that allows none, if it is one alone.
 type Limits = Result<(f64, f64), Option<&'static str>>;
 
-/// Relative distance from the border of the feasible region below which rounding decides. Chosen: a hundred times the tolerance of
-/// the integrator (`route.rs`).
-const BORDER_RTOL: f64 = 1e-11;
-
 /// Distance of a friction ceiling from steady sliding, in `mu_0 sigma`, below which rounding decides. Chosen: a hundred roundings.
 const STEADY_NOISE: f64 = 2e-14;
-
-/// Relative accuracy of the motions. Chosen: a hundredth of the default `rtol`.
-const MOTION_RTOL: f64 = 1e-12;
 
 /// Time in units of its largest slope, below which it is integrated again in its own unit. Derived: the absolute tolerance of 1e-15 is then 1e-12.
 const SMALL_TIME: f64 = 1e-3;
@@ -172,7 +166,7 @@ impl Task {
             let least = min_duration(&self.problem, self.bounds.floor);
             return Some(if self.bounds.floor { self.t_f >= least } else { self.t_f > least });
         }
-        let clear = |room: f64| (room.abs() > BORDER_RTOL * self.t_f).then_some(room > 0.0);
+        let clear = |room: f64| (room.abs() > UNCLEAR_RTOL * self.t_f).then_some(room > 0.0);
         match self.limits()? {
             Err(_) => Some(false),
             Ok((least, most)) => Some(clear(self.t_f - least)? && clear(most - self.t_f)?),
