@@ -301,7 +301,7 @@ impl<'a> TableRun<'a> {
         existing.retain(|number| contains_part(shard_parts, *number));
         let intact = |number: u64| {
             self.run.signal.check()?;
-            Ok((self.look(number)? == Found::Sound).then_some(number))
+            Ok(self.look(number)?.is_none().then_some(number))
         };
         let intact = || existing.into_par_iter().with_max_len(1).map(intact).collect::<Result<Vec<_>, RunError>>();
         Ok(self.run.pool.install(intact)?.into_iter().flatten().collect())
@@ -334,12 +334,11 @@ impl<'a> TableRun<'a> {
     /// Whether a part must be computed: another run may have written it.
     fn is_missing(&self, number: u64, done: &mut TableOutcome) -> bool {
         match self.look(number) {
-            Ok(Found::Sound) => {
+            Ok(None) => {
                 done.kept += 1;
                 return false;
             }
-            Ok(Found::Nothing) => {}
-            Ok(Found::Damaged) => done.damaged += 1,
+            Ok(Some(fault)) => done.damaged += u64::from(matches!(fault, State::Damaged { .. })),
             Err(error) => {
                 self.run.fail(error);
                 return false;
@@ -351,18 +350,17 @@ impl<'a> TableRun<'a> {
         true
     }
 
-    /// The state of a part on disk; an intact one is counted.
-    fn look(&self, number: u64) -> Result<Found, RunError> {
+    /// Why a part must be computed: it is missing or damaged. An intact one is counted.
+    fn look(&self, number: u64) -> Result<Option<State>, RunError> {
         let Run { folder, session, signal, .. } = self.run;
         match folder.state(&session.manifest, &self.table.name, number, CheckDepth::Whole) {
             State::There { statistics } => {
                 let rows = self.table.rows_of(number);
                 signal.keep(rows.end - rows.start);
                 self.count(*statistics);
-                Ok(Found::Sound)
+                Ok(None)
             }
-            State::Missing => Ok(Found::Nothing),
-            State::Damaged { .. } => Ok(Found::Damaged),
+            fault @ (State::Missing | State::Damaged { .. }) => Ok(Some(fault)),
             foreign => Err(folder.fault(&folder.part(&self.table.name, number), foreign).into()),
         }
     }
@@ -382,15 +380,6 @@ impl<'a> TableRun<'a> {
         self.count(statistics);
         Ok(bytes)
     }
-}
-
-/// The content of the place of a part.
-#[derive(PartialEq)]
-enum Found {
-    /// The part, with every bit as it was written.
-    Sound,
-    Damaged,
-    Nothing,
 }
 
 /// A part before publication.
