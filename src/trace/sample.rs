@@ -46,24 +46,8 @@ struct CurvePoint {
 #[derive(Debug)]
 pub struct Samples {
     samples: Vec<CurvePoint>,
-    tolerance: Tolerance,
-}
-
-/// The tolerance of linear interpolation.
-#[derive(Debug, Clone, Copy)]
-struct Tolerance {
-    /// Absolute tolerance of each column, from its range.
-    range: [f64; COLUMNS],
-}
-
-impl Tolerance {
-    /// The tolerance of a column at `value`. Velocity and theta have a relative accuracy at every size.
-    fn at(&self, column: usize, value: f64) -> f64 {
-        if column >= POSITIVE_COLUMNS {
-            return self.range[column];
-        }
-        self.range[column].min((SAMPLES_FRACTION * VALUE_RTOL * value.abs()).max(f64::MIN_POSITIVE))
-    }
+    /// Absolute tolerance of linear interpolation of each column, from its range.
+    tolerance: [f64; COLUMNS],
 }
 
 /// Columns that are interpolated.
@@ -217,7 +201,7 @@ fn look(motion: &dyn Motion, s: f64) -> Option<CurvePoint> {
     is_number.then_some(CurvePoint { s, moment })
 }
 
-fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
+fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> [f64; COLUMNS] {
     let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); COLUMNS];
     for moment in moments {
         for (value, (least, greatest)) in columns(moment).into_iter().zip(&mut ranges) {
@@ -229,7 +213,7 @@ fn tolerance<'a>(moments: impl Iterator<Item = &'a Moment>) -> Tolerance {
     let of_range = |(least, greatest): (f64, f64)| {
         (SAMPLES_FRACTION * RANGE_RTOL * (greatest - least)).max(ROUNDING_RTOL * least.abs().max(greatest.abs()))
     };
-    Tolerance { range: ranges.map(of_range) }
+    ranges.map(of_range)
 }
 
 /// Whether no step takes most of the time of an interval, so that points between its ends can be compared.
@@ -241,16 +225,23 @@ fn is_even(piece: &[CurvePoint]) -> bool {
 }
 
 /// Whether the straight line in time from `from` to `to` is within `tolerance` of the motion at all places `between`.
-fn is_straight(from: &CurvePoint, to: &CurvePoint, between: &[CurvePoint], tolerance: &Tolerance) -> bool {
+fn is_straight(from: &CurvePoint, to: &CurvePoint, between: &[CurvePoint], tolerance: &[f64; COLUMNS]) -> bool {
     let time = to.moment.t - from.moment.t;
     if time <= SAME_TIME_RTOL * to.moment.t {
         return true;
     }
     let values = |sample: &CurvePoint| columns(&sample.moment).map(|value| value.unwrap_or(0.0));
     let (start, end) = (values(from), values(to));
+    let within = |column: usize, value: f64| match column {
+        // Velocity and theta have a relative accuracy at every size.
+        0..POSITIVE_COLUMNS => {
+            tolerance[column].min((SAMPLES_FRACTION * VALUE_RTOL * value.abs()).max(f64::MIN_POSITIVE))
+        }
+        _ => tolerance[column],
+    };
     between.iter().all(|sample| {
         let fraction = (sample.moment.t - from.moment.t) / time;
         let here = values(sample);
-        (0..COLUMNS).all(|i| (start[i] + fraction * (end[i] - start[i]) - here[i]).abs() <= tolerance.at(i, here[i]))
+        (0..COLUMNS).all(|i| (start[i] + fraction * (end[i] - start[i]) - here[i]).abs() <= within(i, here[i]))
     })
 }
