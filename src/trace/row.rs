@@ -48,11 +48,8 @@ pub fn protocol_of(
         Some(Cell::Word(word)) => Some(word.as_str()),
         _ => None,
     };
-    match word(STATUS) {
-        Some(status) if status == Status::NotConverged.name() => {
-            return Err(Pathless::Status("its status is not_converged: the solver could not certify its answer"));
-        }
-        _ => {}
+    if word(STATUS) == Some(Status::NotConverged.name()) {
+        return Err(Pathless::Status("its status is not_converged: the solver could not certify its answer"));
     }
     if table == "step_response" && t_f.is_none() {
         return Err(Pathless::Duration);

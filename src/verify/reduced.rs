@@ -11,10 +11,7 @@ use crate::grid::{Quantity, Scale};
 use crate::model::Units;
 use crate::protocol::Status;
 use crate::sweep::{AxisSpec, AxisValue, BlockSpec, Spec, Sweep, TableSpec};
-use crate::table::{ColumnBuffer, HISTOGRAM_EDGES, OPTIMUM_AXES, STATUS, Signal, Table};
-
-/// Number of shortcuts of a landscape in memory at a time. Chosen: a few megabytes.
-const SHORTCUTS_AT_ONCE: usize = 1 << 16;
+use crate::table::{BLOCK_ROWS, ColumnBuffer, HISTOGRAM_EDGES, OPTIMUM_AXES, STATUS, Signal, Table};
 
 /// Number of shortcuts of a landscape that are solved by an independent route. Chosen: a check takes milliseconds.
 const CHECKED_SHORTCUTS: u64 = 3;
@@ -41,8 +38,8 @@ pub fn check(written: &mut CheckedRow<'_>, table: &Table, units: &Units, spec: &
     let solved: Vec<u64> = (0..CHECKED_SHORTCUTS).map(middle).collect();
     let mut buffer = ColumnBuffer::new(columns.len());
     let mut reduction = Reduction::default();
-    for start in (0..all).step_by(SHORTCUTS_AT_ONCE) {
-        let rows = start..all.min(start + SHORTCUTS_AT_ONCE as u64);
+    for start in (0..all).step_by(BLOCK_ROWS) {
+        let rows = start..all.min(start + BLOCK_ROWS as u64);
         buffer.resize((rows.end - rows.start) as usize);
         // Nothing else has the signal, so nothing stops the computation.
         if request.table.compute(&job, rows.clone(), &mut buffer).is_err() {

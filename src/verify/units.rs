@@ -7,13 +7,10 @@ use crate::table::{Kind, Table};
 
 /// Converts a row of `table` to the units of the model; `relative` determines which of `alpha_2`, `alpha_3` are given relative to the duration.
 pub fn scale(row: &mut Row, table: &Table, units: &Units, relative: [bool; 2]) {
-    let unit = |quantity: Quantity| {
-        let is_relative = match quantity {
-            Quantity::Alpha2 => relative[0],
-            Quantity::Alpha3 => relative[1],
-            _ => false,
-        };
-        quantity.unit(if is_relative { Scale::Duration } else { Scale::Model })
+    let unit = |quantity: Quantity| match quantity {
+        Quantity::Alpha2 if relative[0] => quantity.unit(Scale::Duration),
+        Quantity::Alpha3 if relative[1] => quantity.unit(Scale::Duration),
+        _ => quantity.unit(Scale::Model),
     };
     let unit_of = |name: &str| {
         let axis = Quantity::from_name(name).map(unit);
