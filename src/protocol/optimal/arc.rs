@@ -14,7 +14,7 @@ use multiversion::multiversion;
 
 use crate::model::Law;
 use crate::numerics::MAX_SQUARABLE;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, phi, phi_and_slope, rough_ln};
+use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, phi, rough_ln};
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
@@ -70,7 +70,7 @@ pub(super) struct Sums {
     pub creep: f64,
     /// `int v ln theta dt`, with `SLOPES`; else 0.
     pub state: f64,
-    /// Turning chart: the interior part of `d time/d ln theta_h`. Direct chart: `d time/d z_a`.
+    /// The interior part of `d time/d ln theta_h` in the turning chart; 0 in the direct chart.
     pub sensitivity: f64,
     /// `int u theta/(1 - u)^2 dt`, from which `d time/d ln u(end)` follows without cancellation where theta goes one
     /// way.
@@ -261,7 +261,7 @@ impl Arc {
 
     fn direct_line(&self, theta_a: f64, z_a: f64, friction_a: f64, y_start: f64, y_end: f64) -> (Line, Slice) {
         let Law { a, b } = self.law;
-        let (phi_a, slope_a) = phi_and_slope(z_a);
+        let phi_a = phi(z_a);
         let (low, c) = (y_start.min(y_end), a * phi_a - friction_a);
         // For C > 0 a pair of zeros of E lies above the arc; where theta rises, a branch point of U as well.
         let pair = zero_above(&self.law, friction_a, c, 0.0);
@@ -274,7 +274,6 @@ impl Arc {
             theta_a,
             ln_theta_a: ln(theta_a),
             phi_a,
-            slope_a,
             friction_a,
             sign: 1f64.copysign(z_a),
         };
@@ -795,7 +794,6 @@ struct DirectSlice {
     theta_a: f64,
     ln_theta_a: f64,
     phi_a: f64,
-    slope_a: f64,
     friction_a: f64,
     sign: f64,
 }
@@ -809,7 +807,7 @@ impl Integrands for DirectSlice {
     #[inline(always)]
     fn units(&self) -> [f64; 4] {
         let theta = self.theta_a;
-        [theta, 1.0, theta * self.slope_a, -theta * theta]
+        [theta, 1.0, 0.0, -theta * theta]
     }
 
     #[inline(always)]
@@ -827,9 +825,9 @@ impl Integrands for DirectSlice {
             let inverse = 1.0 / found.excess[i];
             terms.time[i] = -weight[i] * grow[i] * inverse;
             terms.slip[i] = -weight[i] * inverse * found.u[i];
-            terms.sensitivity[i] = -terms.time[i] * grow[i] * found.u[i] * inverse * inverse;
+            terms.swing[i] = -terms.time[i] * grow[i] * found.u[i] * inverse * inverse;
         }
-        (terms.swing, terms.u, terms.ln_u) = (terms.sensitivity, found.u, found.ln_u);
+        (terms.u, terms.ln_u) = (found.u, found.ln_u);
         terms
     }
 }

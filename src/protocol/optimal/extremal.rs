@@ -60,15 +60,11 @@ pub(super) struct Extremal {
 /// Derivative of the total time with respect to `q`, up to the interior sum `I` of the quadrature.
 #[derive(Debug, Clone, Copy)]
 enum Rate {
-    /// `gain (I + inner) + outer`, on the part of the family that a floor arc parametrises.
-    Floor { gain: f64, inner: f64, outer: f64 },
     /// `gain (I + inner) + outer`, where `outer` belongs to the start of the arc and `inner` to its end; where theta falls
     /// at once, also `one_way` times the swing.
     Turning { gain: f64, inner: f64, outer: f64, one_way: f64 },
     /// `gain (I + inner) + outer`, where `inner` belongs to the start and `outer` to the end.
     Ending { gain: f64, inner: f64, outer: f64 },
-    /// `gain` times the sensitivity of the direct chart.
-    Direct { gain: f64 },
     /// `gain` times the swing, for arcs on which theta goes one way.
     OneWay { gain: f64 },
 }
@@ -243,7 +239,8 @@ impl Problem {
         // d ln theta_h/d ln theta_c from C(theta_h) = C_leaving(theta_c); the floor arc's own time cancels against the start
         // of the arc.
         let m = (1.0 + law.a - law.b + law.b * z) / theta * theta_h / (c_h + law.a - law.b);
-        let rate = Rate::Floor { gain: unit * m * rest / theta, inner: self.to.theta / end.excess, outer: unit * m };
+        let (gain, inner) = (unit * m * rest / theta, self.to.theta / end.excess);
+        let rate = Rate::Turning { gain, inner, outer: unit * m, one_way: 0.0 };
         let leaving = Leaving { time_at_floor: self.t_min() + time, theta_s: theta, late: time, lags: false };
         Some(leaving.along(arc, z, end.ln_u, rate))
     }
@@ -260,6 +257,7 @@ impl Problem {
         let excess = law.a * phi_0;
         let friction_a = self.friction_a();
         let pull = friction_a - excess;
+        let one_way = -excess_0 / self.from.theta;
         if may_turn(&law, excess, pull)
             && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
         {
@@ -272,13 +270,13 @@ impl Problem {
             let swing = law.a * (1.0 + xi) / (c_h + law.a - law.b);
             let rate = if x_squares < xi {
                 // A short arc: both ends would cancel.
-                Rate::OneWay { gain: -excess_0 / self.from.theta }
+                Rate::OneWay { gain: one_way }
             } else {
                 Rate::Turning {
                     gain: swing * excess_0,
                     inner: self.to.theta / end.excess,
                     outer: -self.from.theta * swing,
-                    one_way: -excess_0 / self.from.theta,
+                    one_way,
                 }
             };
             return Some(self.at_once().along(arc, z_0, end.ln_u, rate));
@@ -286,7 +284,7 @@ impl Problem {
         let y_end = -self.depth();
         let chart = Chart::Direct { theta_a: self.from.theta, z_a: z_0, friction_a, y_start: 0.0, y_end };
         let arc = Arc { law, chart };
-        Some(self.at_once().along(arc, z_0, arc.end()?.ln_u, Rate::Direct { gain: 1.0 }))
+        Some(self.at_once().along(arc, z_0, arc.end()?.ln_u, Rate::OneWay { gain: one_way }))
     }
 
     /// Falling problem, `q <= 0`: `X = layer q` at the start.
@@ -459,9 +457,9 @@ impl Extremal {
     #[inline(always)]
     pub fn end_terms(&self) -> [f64; 2] {
         match self.rate {
-            Rate::Floor { inner, .. } | Rate::Turning { inner, .. } => [0.0, inner],
+            Rate::Turning { inner, .. } => [0.0, inner],
             Rate::Ending { inner, .. } => [inner, 0.0],
-            Rate::Direct { .. } | Rate::OneWay { .. } => [0.0, 0.0],
+            Rate::OneWay { .. } => [0.0, 0.0],
         }
     }
 
@@ -474,11 +472,8 @@ impl Extremal {
         let inside = |gain: f64| gain * (sensitivity + ends);
         match self.rate {
             Rate::Turning { one_way, .. } if !has[0] && one_way != 0.0 => one_way * swing,
-            Rate::Floor { gain, outer, .. } | Rate::Turning { gain, outer, .. } => {
-                inside(gain) + if has[0] { outer } else { 0.0 }
-            }
+            Rate::Turning { gain, outer, .. } => inside(gain) + if has[0] { outer } else { 0.0 },
             Rate::Ending { gain, outer, .. } => inside(gain) + if has[1] { outer } else { 0.0 },
-            Rate::Direct { gain } => gain * sensitivity,
             Rate::OneWay { gain } => gain * swing,
         }
     }
@@ -489,7 +484,8 @@ impl Extremal {
         let time = self.time_beyond(sums);
         let [start, end] = self.end_terms();
         let rate = self.rate_of(sums, start + end, [true; 2]);
-        let (value, slope) = if let Rate::Floor { .. } = self.rate {
+        let floor_counts = self.time_at_floor > 0.0 && !self.lags;
+        let (value, slope) = if floor_counts {
             (time / beyond - 1.0, rate / beyond)
         } else if time > 0.0 {
             (ln(time / beyond), rate / time)
