@@ -4,12 +4,13 @@
 use super::arc::Sums;
 use super::ceiling::Ceilings;
 use super::clamp::{Path, PathView, Switch, Switches, falling_part};
-use super::extremal::{MAX_LN_U, Problem};
+use super::extremal::Problem;
 use super::guess::{Guess, QUADRATURE_ERROR, UNKNOWN_TIME_ERROR, capped_guess};
 use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum};
 use crate::model::Law;
+use crate::numerics::MAX_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::turning;
@@ -435,7 +436,7 @@ fn all_on_ceilings(problem: &Problem, ceilings: &Ceilings) -> f64 {
             z_0 = turning((2.0 * most / a).sqrt()).ln_u;
         }
     }
-    if z_0.is_finite() { z_0 } else { MAX_LN_U }
+    if z_0.is_finite() { z_0 } else { MAX_LN }
 }
 
 /// The lifetime of this logarithm.

@@ -18,6 +18,7 @@ use super::arc::{Arc, Chart, Sums, omega, steady_friction};
 use super::floor;
 use super::lifetime::Lifetime;
 use crate::model::Law;
+use crate::numerics::MAX_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi, phi_and_slope};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::Turning;
@@ -34,9 +35,6 @@ pub(super) struct Problem {
     pub fall: f64,
     pub bounded: bool,
 }
-
-/// Largest `ln u` that is searched: protocols of `1e-300` in units of `l/v_0`. Derived: beyond, `e^(ln u)` comes near overflow, at 709.
-pub(super) const MAX_LN_U: f64 = 690.0;
 
 /// One member of the family.
 #[derive(Debug, Clone, Copy)]
@@ -180,8 +178,8 @@ impl Problem {
     /// number.
     pub fn bracket(&self, q_floor: Option<f64>, beyond: f64) -> (f64, f64) {
         match (self.rises(), q_floor) {
-            (false, Some(q_floor)) => (-beyond / self.theta_a(), MAX_LN_U - q_floor),
-            (false, None) => (f64::NEG_INFINITY, MAX_LN_U),
+            (false, Some(q_floor)) => (-beyond / self.theta_a(), MAX_LN - q_floor),
+            (false, None) => (f64::NEG_INFINITY, MAX_LN),
             (true, Some(_)) => (f64::NEG_INFINITY, beyond / self.theta_a()),
             (true, None) => (f64::NEG_INFINITY, f64::INFINITY),
         }

@@ -3,12 +3,12 @@
 use super::arc::{ArcPoint, Sums};
 use super::ceiling::Ceilings;
 use super::clamp::PathView;
-use super::extremal::{Extremal, MAX_LN_U, Problem};
+use super::extremal::{Extremal, Problem};
 use super::guess::{Guess, QUADRATURE_ERROR};
 use super::{ArcKind, Optimum, Strategy, floor};
-use crate::numerics::ROUNDING_RTOL;
 use crate::numerics::elementary::exp;
 use crate::numerics::root::{Probe, newton_in_pieces};
+use crate::numerics::{MAX_LN, ROUNDING_RTOL};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
@@ -282,7 +282,7 @@ pub(super) fn read(
     let velocity = |&ArcPoint { theta, ln_theta, ln_u: z }: &ArcPoint, kind: ArcKind| match kind {
         ArcKind::VCeiling => ceilings.v,
         // exp(z) would lose digits below the normal numbers.
-        _ if z < -MAX_LN_U => exp(z - ln_theta),
+        _ if z < -MAX_LN => exp(z - ln_theta),
         _ => exp(z) / theta,
     };
     let held = time_at_floor > 0.0;
