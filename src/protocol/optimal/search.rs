@@ -8,7 +8,7 @@ use super::guess::{Guess, QUADRATURE_ERROR};
 use super::{ArcKind, Optimum, Strategy, floor};
 use crate::numerics::elementary::exp;
 use crate::numerics::root::{Probe, newton_in_pieces};
-use crate::numerics::{MAX_LN, ROUNDING_RTOL};
+use crate::numerics::{MAX_LN, ROOT_OF_ROUNDING, ROUNDING_RTOL};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// Tolerance of a quadrature whose results are to be good to `rtol`. Velocities at the ends change by up to some twenty
@@ -17,14 +17,9 @@ pub(super) fn quadrature_tolerance(rtol: f64) -> f64 {
     0.02 * rtol
 }
 
-/// Steps across the seam of the family before it counts as met. Chosen: more than a search takes that converges on either side.
-const MAX_CROSSINGS: u32 = 4;
-
-/// Most steps that make a short floor arc more exact. Chosen: more than a converging refinement takes.
+/// Most steps across the seam of the family before it counts as met, and most that make a short floor arc more exact. Chosen: more than either takes
+/// where it converges.
 const MAX_REFINEMENTS: u32 = 10;
-
-/// A relative change of a short floor arc after which the next one is rounding. Derived: the next one is its square.
-const LAST_REFINEMENT_RTOL: f64 = 1e-7;
 
 /// Fraction of the whole time below which a floor arc is short. Derived: as a difference of times, a longer one loses at most two digits.
 const SHORT_FLOOR_TIME: f64 = 0.01;
@@ -173,7 +168,7 @@ impl<'a, F: Family> Search<'a, F> {
     fn root(&mut self, mut start: f64, bracket: (f64, f64), fraction: f64) -> Option<(f64, F::Path)> {
         let (family, enough, least) = (self.family, self.accuracy.enough, self.accuracy.least);
         let mut outcome = None;
-        for _ in 0..MAX_CROSSINGS {
+        for _ in 0..MAX_REFINEMENTS {
             let root = newton_in_pieces(|p| self.probe(p, fraction), start, bracket, family.rises(), enough, least);
             // Rounding may step to an end of the bracket, where no member need exist.
             let member = |x| family.path(x).map(|path| (x, path));
@@ -209,9 +204,9 @@ impl<'a, F: Family> Search<'a, F> {
             let Some(next) = family.path(finer) else { break };
             (*x, *path) = (finer, next);
             let after = family.short_arc(finer, &next).map_or(before.time, |arc| arc.time);
-            // An arc that such a step changes is not yet known to the square of that change.
+            // An arc is known to the square of what such a step changes.
             let settled =
-                (after - before.time).abs() <= LAST_REFINEMENT_RTOL * before.time || last.value.abs() <= ROUNDING_RTOL;
+                (after - before.time).abs() <= ROOT_OF_ROUNDING * before.time || last.value.abs() <= ROUNDING_RTOL;
             if family.piece(finer, &next) == piece && last.value.abs() <= self.accuracy.enough && settled && !crosses {
                 break;
             }
