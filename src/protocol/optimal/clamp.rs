@@ -11,8 +11,8 @@ use super::extremal::{Extremal, Problem};
 use super::lifetime::Lifetime;
 use super::{ArcKind, floor};
 use crate::model::Law;
-use crate::numerics::MAX_STEPS;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi, phi_and_slope};
+use crate::numerics::{MAX_SQUARABLE, MAX_STEPS};
 
 /// The part of an extremal on which theta falls to `theta_1`, as a function of the depth `d = ln(theta_top/theta)`.
 #[derive(Debug, Clone, Copy)]
@@ -127,7 +127,7 @@ impl Fall {
             // The third derivative is that of phi, whose rate cancels where both terms fall alike.
             let third = rise.abs().max(1.0) * rise.abs().max(1.0) * (phi_slope / slope).abs();
             let left = (correction * correction + third * newton * newton) * step.abs();
-            if left <= ROUNDING * d || step.abs() <= ROUNDING * d {
+            if left.min(step.abs()) <= f64::EPSILON * d {
                 return next.max(from).min(to);
             }
             d = if next > from && next < to { next } else { 0.5 * (from + to) };
@@ -135,9 +135,6 @@ impl Fall {
         d
     }
 }
-
-/// Relative rounding error of a depth. Derived: that of one operation.
-const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
 /// Depths of the switches of the last path of a search, from which the next search for them starts: the first and the second
 /// of friction, and that of the velocity; NaN before.
@@ -549,7 +546,8 @@ impl Path {
         let slope = -ceilings.kappa;
         fall.z_tau = slope * exp(ln_delta);
         let mut path = Path::along(problem, ceilings, extremal, &fall, &Switches::unknown());
-        if ln_delta < SQUARE_UNDERFLOW_LN {
+        // Squares of delta underflow.
+        if exp(ln_delta) < 1.0 / MAX_SQUARABLE {
             path.rate = Some(-fall.theta_top / slope);
             let first = path.pieces.iter_mut().flatten().find_map(|piece| match piece {
                 ClampedPiece::Ceiling { arc, .. } => Some(arc),
@@ -611,6 +609,3 @@ pub(super) struct Switch {
     /// Derivative of `way` with respect to the parameter, over `-z`.
     pub pace_over_z: f64,
 }
-
-/// `ln delta` below which squares of `delta` count as underflown: they are subnormal from -354 on. Chosen: a margin for their factors.
-const SQUARE_UNDERFLOW_LN: f64 = -300.0;
