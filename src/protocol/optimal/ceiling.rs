@@ -8,10 +8,10 @@ use multiversion::multiversion;
 use super::clamp::{Depth, Gap};
 use super::{ArcKind, Bounds};
 use crate::model::{Law, friction_margin};
-use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_and_m1, exp_m1, ln, ln_1p};
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, fold};
+use crate::numerics::{MIN_INVERTIBLE, NEGLIGIBLE_LN};
 
 /// The ceilings of a problem that ends in steady sliding.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -263,7 +263,7 @@ impl CeilingArc {
     /// `ln |u - 1|` at the end of greater theta, and its change to the other: the coordinate of a motion.
     pub fn coordinates(&self) -> (f64, f64) {
         // ln(e^z - 1) = ln z for small z.
-        let beyond = |z: f64| if z.abs() > LINEAR_LN_U { ln(exp_m1(z).abs() / z.abs()) } else { 0.0 };
+        let beyond = |z: f64| if z.abs() > MIN_INVERTIBLE { ln(exp_m1(z).abs() / z.abs()) } else { 0.0 };
         let (high, low) = (self.ln_z[0] + beyond(self.z_hi), self.ln_z[1] + beyond(self.z_lo));
         (high, low - high)
     }
@@ -291,7 +291,7 @@ impl CeilingArc {
             _ if even => self.z_hi - rise * depth,
             _ => z,
         };
-        let ln_z = if at < ln(LINEAR_LN_U) && !even { at } else { ln(z.abs()) };
+        let ln_z = if at < ln(MIN_INVERTIBLE) && !even { at } else { ln(z.abs()) };
         // Close to u = 1 only the distance from it has digits.
         let from_z = !even && !self.is_steady_at_high();
         let above = if from_z { ((z - self.z_lo) / rise).clamp(0.0, self.length) } else { self.length - depth };
@@ -303,9 +303,6 @@ impl CeilingArc {
         if self.falls() { parts } else { [parts[1], parts[0]] }
     }
 }
-
-/// `|ln u|` below which it is `|u - 1|`: the relative difference is half of it, below the rounding of a double. Derived from it.
-const LINEAR_LN_U: f64 = 1e-17;
 
 /// Change of `ln |u - 1|` for one of `ln theta` below which theta is the coordinate. Chosen: either determines a place to most digits there.
 const LEAST_CHANGE: f64 = 0.1;
@@ -338,9 +335,10 @@ impl CeilingLine {
     fn of(arc: &CeilingArc) -> CeilingLine {
         let (high_first, ln_z) = (arc.is_steady_at_high(), arc.least_ln_z());
         let slope = arc.rise().abs();
-        let lingered = if ln_z < STEADY_LN_Z && slope > 0.0 {
+        // Closer to u = 1, theta and z/(e^z - 1) no longer change.
+        let lingered = if ln_z < -NEGLIGIBLE_LN && slope > 0.0 {
             let theta = arc.theta_hi * if high_first { 1.0 } else { exp(-arc.length) };
-            theta / slope * (arc.ln_z[usize::from(high_first)].min(STEADY_LN_Z) - ln_z)
+            theta / slope * (arc.ln_z[usize::from(high_first)].min(-NEGLIGIBLE_LN) - ln_z)
         } else {
             0.0
         };
@@ -365,9 +363,9 @@ impl CeilingLine {
         let (mut from, mut to, mut start) = (0.0, 0.0, 0.0);
         // An arc that is short compared with its distance from u = 1 has its digits in s alone.
         let ln_z = arc.least_ln_z();
-        if ln_z < STEADY_LN_Z || ln_z < ln(0.5 * near) && slope * self.length > MAX_PANEL * least {
+        if ln_z < -NEGLIGIBLE_LN || ln_z < ln(0.5 * near) && slope * self.length > MAX_PANEL * least {
             let greatest = (least + slope * self.length).min(near);
-            (from, to) = (ln_z.max(STEADY_LN_Z), ln(greatest).max(STEADY_LN_Z));
+            (from, to) = (ln_z.max(-NEGLIGIBLE_LN), ln(greatest).max(-NEGLIGIBLE_LN));
             start = (greatest - least) / slope;
         }
         let longest = MAX_PANEL * (1.0 / slope).min(1.0).min((least + slope * start) / slope);
@@ -469,9 +467,6 @@ impl CeilingChart {
         });
     }
 }
-
-/// `ln |z|` below which `theta` and `z/(e^z - 1)` no longer change. Derived: `e^-42` is 6e-19, below the rounding of a double.
-pub(super) const STEADY_LN_Z: f64 = -42.0;
 
 /// Longest panel: near `u = 1` in `ln |z|`, else in `ln theta` in units of the distance from `u = 1` and of the change of `z` by 1. Derived:
 /// the singularities leave `4^-32` (at `ln 2 pi + pi i/2`) and `3^-32`.

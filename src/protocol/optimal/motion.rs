@@ -2,7 +2,7 @@
 
 use super::ArcKind;
 use super::arc::{Arc, EqualSteps};
-use super::ceiling::{CeilingArc, Ceilings, STEADY_LN_Z};
+use super::ceiling::{CeilingArc, Ceilings};
 use super::clamp::{ClampedPiece, Depth, Gap};
 use super::constrained::{Constrained, Sitting};
 use super::extremal::Problem;
@@ -10,6 +10,7 @@ use super::lifetime::Lifetime;
 use super::search::ROUNDING;
 use super::slopes::costate_off_bounds;
 use crate::model::Law;
+use crate::numerics::NEGLIGIBLE_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p};
 use crate::protocol::motion::PieceTimes;
 use crate::protocol::{Moment, Motion};
@@ -174,7 +175,7 @@ impl TimedCeiling {
         let theta = arc.theta_hi * exp(-depth.below);
         let of_v = arc.kind == ArcKind::VCeiling;
         let friction = if of_v { 1.0 + a * ln(v_ceiling) + b * ln(theta) } else { tau };
-        let pressed = if high.ln_z[1] < STEADY_LN_Z {
+        let pressed = if high.ln_z[1] < -NEGLIGIBLE_LN {
             // Both vanish with z, and their ratio grows from 0 where they begin.
             self.gap.limit(arc, depth) * -exp_m1((arc.least_ln_z() - high.ln_z[1]).min(0.0))
         } else {
