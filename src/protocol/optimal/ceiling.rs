@@ -60,19 +60,13 @@ impl Ceilings {
 
     /// The largest `ln u` at `y`.
     pub fn cap(&self, y: f64) -> f64 {
-        let (y, [z_v, z_tau]) = self.nearer(y);
-        (z_v + y).min(z_tau + self.kappa * y)
+        self.cap_of(ArcKind::VCeiling, y).min(self.cap_of(ArcKind::TauCeiling, y))
     }
 
-    /// The distance from the nearer end, and `ln u` on both ceilings there.
-    fn nearer(&self, y: f64) -> (f64, [f64; 2]) {
-        let above = y - self.depth;
-        if above.abs() < y.abs() { (above, self.z_start) } else { (y, [self.z_v, self.z_tau]) }
-    }
-
-    /// `ln u` on one of the ceilings.
+    /// `ln u` on one of the ceilings, from the nearer end.
     pub fn cap_of(&self, kind: ArcKind, y: f64) -> f64 {
-        let (y, [z_v, z_tau]) = self.nearer(y);
+        let above = y - self.depth;
+        let (y, [z_v, z_tau]) = if above.abs() < y.abs() { (above, self.z_start) } else { (y, [self.z_v, self.z_tau]) };
         if kind == ArcKind::VCeiling { z_v + y } else { z_tau + self.kappa * y }
     }
 
@@ -177,17 +171,13 @@ impl CeilingArc {
 
     /// Duration.
     pub fn time(&self) -> f64 {
-        match self.kind {
-            ArcKind::VCeiling => self.length_v().abs() / self.ceilings.v,
-            _ if self.ceilings.kappa == 0.0 => {
-                let theta_lo = self.theta_hi * exp(-self.length);
-                theta_lo * exp_m1(self.length) / exp_m1(self.z_hi).abs()
-            }
-            _ => {
-                let line = CeilingLine::of(self);
-                line.lingered + self.theta_hi * line.sums(self).0[0]
-            }
+        if self.kind == ArcKind::VCeiling {
+            // ln of x = u - 1 at the end of greater theta over that at the other.
+            let (u, x) = exp_and_m1(self.z_lo);
+            return ln_1p(u * exp_m1(self.length) / x).abs() / self.ceilings.v;
         }
+        let line = CeilingLine::of(self);
+        line.lingered + self.theta_hi * line.sums(self).0[0]
     }
 
     /// Work of friction, and its nodes.
@@ -205,12 +195,6 @@ impl CeilingArc {
         // Steady sliding on the ceiling, at one lifetime.
         let ln_theta = ln_theta - if line.high_first { 0.0 } else { self.length };
         (work + (1.0 + (b - a) * ln_theta) * line.lingered * exp(-ln_theta), nodes)
-    }
-
-    /// `ln` of `x = u - 1` at the end of greater theta over that at the other, on the ceiling of the velocity.
-    fn length_v(&self) -> f64 {
-        let (u, x) = exp_and_m1(self.z_lo);
-        ln_1p(u * exp_m1(self.length) / x)
     }
 
     /// Parts of the work, and the prices.
