@@ -1,8 +1,6 @@
 //! The closed-loop law: what the optimal protocol does now, from the contact lifetime and the time that is left.
 
-use super::arc::ArcPoint;
 use super::ceiling::Ceilings;
-use super::clamp::Path;
 use super::constrained::{self, Constrained};
 use super::extremal::Problem;
 use super::guess::Guess;
@@ -11,7 +9,7 @@ use super::search::{self, Time};
 use super::{ArcKind, Bounds, FeedbackPoint, INFEASIBLE, Optimum, Strategy, slopes};
 use crate::model::Law;
 use crate::numerics::double_double::DoubleDouble;
-use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, phi};
+use crate::numerics::elementary::{exp, ln_1p, phi};
 use crate::protocol::{Motion, Solved, SolverStats, Status};
 
 /// The closed-loop law: the optimal protocol from the contact lifetime `theta` to steady sliding at `v_f` in `t_left`.
@@ -38,9 +36,7 @@ pub fn feedback_at(
         Some(path) => {
             let kind = path.pieces().next().map_or(ArcKind::Free, |piece| piece.kind());
             let arc = if optimum.time_at_floor > 0.0 { ArcKind::Floor } else { kind };
-            // What the optimum does now does not depend on a time that it then waits.
-            let gain =
-                if sitting.is_some() { waiting_gain(&problem, path) } else { slopes::gain(&problem, path, tolerance) };
+            let gain = slopes::gain(&problem, path, sitting.is_some(), tolerance);
             slopes::costate(&problem, path).zip(gain).map(|(costate, gain)| (costate, gain, arc))
         }
         // Without a path it is steady sliding, or the floor to the end: with less theta no protocol arrives.
@@ -51,18 +47,6 @@ pub fn feedback_at(
     };
     let value = FeedbackPoint { v: optimum.v_start, work_to_go: optimum.work, costate, gain, arc };
     Solved { status, value: Some(value), stats }
-}
-
-/// The gain before a wait at the end: `C` is that of the turn, whatever theta.
-fn waiting_gain(problem: &Problem, path: &Path) -> Option<f64> {
-    if path.extremal.time_at_floor > 0.0 {
-        return Some(0.0);
-    }
-    let Law { a, b } = problem.law;
-    let ArcPoint { theta, ln_u: z, .. } = path.pieces().next()?.ends()[0];
-    let friction = 1.0 + a * z + (b - a) * ln(theta);
-    let excess = exp_m1(z);
-    Some(-exp(z) / theta / excess * (friction - b + a) / (a * theta))
 }
 
 /// The problem from `theta` to steady sliding at `v_f`, and its ceilings; `None` outside the domain.

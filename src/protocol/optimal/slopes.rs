@@ -117,8 +117,8 @@ pub(super) fn costate_off_bounds(law: &Law, c: f64, point: &ArcPoint) -> f64 {
     }
 }
 
-/// `dv/dtheta` at the start, for a fixed time left.
-pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64> {
+/// `dv/dtheta` at the start, for a fixed time left, at the end of which it may wait.
+pub(super) fn gain(problem: &Problem, path: &Path, waits: bool, tolerance: f64) -> Option<f64> {
     let Law { a, b } = problem.law;
     if path.extremal.time_at_floor > 0.0 {
         return Some(0.0);
@@ -132,6 +132,12 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
         ArcKind::TauCeiling => return Some(-b * v / (a * theta)),
         _ => {}
     }
+    let excess = exp_m1(z);
+    let at_fixed_c = (start.friction(&problem.law) - b + a) / (a * theta);
+    if waits {
+        // C is that of the turn, whatever theta.
+        return Some(-v / excess * at_fixed_c);
+    }
     let (mut at_fixed_x, mut swing) = (0.0, 0.0);
     for (i, piece) in path.pieces().enumerate() {
         if let ClampedPiece::Free { arc, ends, .. } = piece {
@@ -141,7 +147,6 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
             swing += sums.swing;
         }
     }
-    let friction = start.friction(&problem.law);
     match path.extremal.arc.chart {
         Chart::Turning { theta_h, ln_theta_h, x_start, x_end, x_squares }
             if x_start * x_end <= 0.0 || x_squares.abs() > x_start.abs().min(x_end.abs()).powi(2) =>
@@ -151,13 +156,9 @@ pub(super) fn gain(problem: &Problem, path: &Path, tolerance: f64) -> Option<f64
             let k = (c_h + a - b) / theta_h;
             let omega = omega(&problem.law, c_h, x_start * x_start);
             let turned = x_start / (omega * turning(x_start * omega).slope);
-            let inner = k * k / (exp_m1(z) * k - theta * k / at_fixed_x);
+            let inner = k * k / (excess * k - theta * k / at_fixed_x);
             Some(-v / a * (a / theta + (a - b) * turned / theta_h + inner))
         }
-        _ => {
-            let excess = exp_m1(z);
-            let by_c = -swing / a;
-            Some(-v / excess * ((friction - b + a) / (a * theta) + theta / (a * excess * by_c)))
-        }
+        _ => Some(-v / excess * (at_fixed_c - theta / (excess * swing))),
     }
 }
