@@ -7,7 +7,7 @@ use super::state::State;
 use crate::model::StateLaw;
 use crate::numerics::dilogarithm::dilogarithm;
 use crate::numerics::elementary::{ln, ln_1p};
-use crate::numerics::gauss::rule;
+use crate::numerics::gauss::{SHORT_NODES, rule};
 
 /// The bound on which an arc lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,8 +104,8 @@ fn integral(x: f64, span: f64) -> f64 {
     if span > x {
         return primitive(x + span) - primitive(x);
     }
-    // The integrand is regular at 1; the nearest singularity, at 0, is three half lengths from the middle.
-    let rule = rule(NODES);
+    // The integrand is regular at 1; the nearest singularity, at 0, is three half lengths from the middle: the error is (3 + sqrt 8)^-32.
+    let rule = rule(SHORT_NODES);
     let half = 0.5 * span;
     let slope = |node: f64| {
         let x = x + half * (1.0 + node);
@@ -113,9 +113,6 @@ fn integral(x: f64, span: f64) -> f64 {
     };
     half * rule.x.iter().zip(&rule.w).map(|(&node, &weight)| weight * slope(node)).sum::<f64>()
 }
-
-/// Gauss nodes of a short arc: the error is `(3 + sqrt 8)^(-2 n)`, 4e-17, of the integrand.
-const NODES: usize = 11;
 
 /// `artanh(x) ln x - [Li_2(x) - Li_2(-x)]/2`, whose derivative is `ln x/(1 - x^2)`; `-pi^2/8` at 1.
 fn primitive(x: f64) -> f64 {
