@@ -13,7 +13,7 @@ use crate::model::arcsinh::{reduction, scaled_friction, steady_level};
 use crate::model::{Law, Transition};
 use crate::numerics::elementary::{exp, ln, ln_1p};
 use crate::numerics::root::{LAST_STEP_RESIDUAL, crossing};
-use crate::numerics::{LONG_ROUNDING_RTOL, MAX_LN};
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_LN, TIGHT_RTOL};
 use extremal::{Extremal, Point, Sums};
 
 /// The optimum and the derivatives of its work.
@@ -145,7 +145,8 @@ impl Problem {
             return None;
         }
         let width = bracket[1] - bracket[0];
-        let q = crossing(value, bracket, values, BRACKET_RTOL * width);
+        // The work is corrected to first order, and the other numbers change as much.
+        let q = crossing(value, bracket, values, TIGHT_RTOL * width);
         let member = self.member(q)?;
         let sums = member.sums(&Sums::default(), stats)?;
         // The correction of the work leaves the square.
@@ -190,6 +191,3 @@ const MIN_SLOPE: f64 = 1e-4;
 
 /// `-q` above which the start counts by its velocity. Chosen: the turning point is then at `e` times theta, far from the extremal.
 const TURNING_CHART_END: f64 = 1.0;
-
-/// Width at which the search ends, relative to its bracket. Derived: the work is corrected to first order, and the other numbers change as much.
-const BRACKET_RTOL: f64 = 1e-13;
