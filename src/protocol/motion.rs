@@ -75,8 +75,16 @@ impl PieceTimes {
     }
 
     /// Whether the times of a piece count from the start.
-    pub fn is_nearer_start(&self, piece: usize) -> bool {
+    fn is_nearer_start(&self, piece: usize) -> bool {
         self.gone[piece + 1] <= self.left[piece]
+    }
+
+    /// The piece at `s` of pieces that are equally long in `s`, from 0 to 1, and the part of it from `s` to the end from which its times count.
+    pub fn part_at(&self, s: f64) -> (usize, [f64; 2]) {
+        let count = self.left.len() - 1;
+        let (piece, _) = interval_at(s, count);
+        let [from, to] = [piece, piece + 1].map(|edge| edge as f64 / count as f64);
+        (piece, if self.is_nearer_start(piece) { [from, s] } else { [s, to] })
     }
 
     /// The time in a piece, `part` after its start or, if its times count from the end, before its end.

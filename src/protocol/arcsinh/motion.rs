@@ -3,7 +3,7 @@
 use super::extremal::{Extremal, INTERVALS, Sums};
 use crate::model::Friction;
 use crate::protocol::motion::PieceTimes;
-use crate::protocol::{Moment, Motion, SolverStats};
+use crate::protocol::{Moment, Motion, SolverStats, equal_landmarks};
 
 /// The motion along an extremal; its parameter is the fraction of the coordinate.
 pub(super) struct ExtremalMotion {
@@ -18,8 +18,9 @@ impl ExtremalMotion {
     /// The motion of duration `t_f`; `None` if the extremal does not exist throughout.
     pub fn new(extremal: Extremal, t_f: f64, stats: &mut SolverStats) -> Option<ExtremalMotion> {
         let whole = extremal.sums(&Sums::default(), stats)?;
-        let mut time = |interval| Some(extremal.part([interval, interval + 1].map(place)).sums(&whole, stats)?.time);
-        let times: Option<Vec<f64>> = (0..INTERVALS).map(&mut time).collect();
+        let landmarks = equal_landmarks(INTERVALS as usize);
+        let pieces = landmarks.windows(2).map(|ends| extremal.part([ends[0], ends[1]]));
+        let times: Option<Vec<f64>> = pieces.map(|piece| Some(piece.sums(&whole, stats)?.time)).collect();
         let mut times = PieceTimes::new(&times?);
         times.set(0.0, t_f);
         Some(ExtremalMotion { extremal, t_f, whole, times })
@@ -27,9 +28,7 @@ impl ExtremalMotion {
 
     /// Time at `s`.
     fn time(&self, s: f64) -> Option<f64> {
-        let interval = ((s * f64::from(INTERVALS)) as u32).min(INTERVALS - 1);
-        let (piece, [from, to]) = (interval as usize, [interval, interval + 1].map(place));
-        let part = if self.times.is_nearer_start(piece) { [from, s] } else { [s, to] };
+        let (piece, part) = self.times.part_at(s);
         let time = if part[0] < part[1] {
             self.extremal.part(part).sums(&self.whole, &mut SolverStats::default())?.time
         } else {
@@ -39,18 +38,13 @@ impl ExtremalMotion {
     }
 }
 
-/// The fraction at the start of an interval.
-fn place(interval: u32) -> f64 {
-    f64::from(interval) / f64::from(INTERVALS)
-}
-
 impl Motion for ExtremalMotion {
     fn duration(&self) -> f64 {
         self.t_f
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        (0..=INTERVALS).map(place).collect()
+        equal_landmarks(INTERVALS as usize)
     }
 
     fn at(&self, s: f64) -> Moment {

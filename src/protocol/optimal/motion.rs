@@ -317,9 +317,7 @@ impl Timed {
         if place >= 1.0 {
             return self.times.end;
         }
-        let piece = ((place * f64::from(self.pieces.count)) as usize).min(self.pieces.count as usize - 1);
-        let [from, to] = self.pieces.edges_of(piece);
-        let [from, to] = if self.times.is_nearer_start(piece) { [from, place] } else { [place, to] };
+        let (piece, [from, to]) = self.times.part_at(place);
         self.times.at(piece, self.pieces.time(from, to))
     }
 }
