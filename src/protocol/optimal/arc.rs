@@ -13,11 +13,11 @@
 use multiversion::multiversion;
 
 use crate::model::Law;
-use crate::numerics::MAX_SQUARABLE;
 use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, phi, rough_ln};
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
+use crate::numerics::{self, MAX_SQUARABLE};
 
 /// The chart that an arc is drawn in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -355,11 +355,11 @@ impl Line {
     fn halved(&self, tolerance: f64, before: Sums, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
         let (mut total, mut panels) =
             (Sums { nodes: before.nodes, ..Sums::default() }, vec![(self.start, self.length)]);
-        for _ in 0..MAX_HALVINGS {
+        for _ in 0..numerics::MAX_PANELS {
             let Some((start, length)) = panels.pop() else { break };
             let half = 0.5 * length;
             let [coarse, fine] = [2 * LANES, 4 * LANES].map(|nodes| kernel(start + half, half, rule(nodes)));
-            // NaN, where there is no arc, stays. The lag may be far less than the time; it has the rounding of e^z, z down to -690.
+            // NaN, where there is no arc, stays. The lag may be far less than the time; it has the rounding of e^z, z down to -700.
             if (fine.time - coarse.time).abs() > tolerance.max(AGREEMENT) * before.time
                 || (fine.lag - coarse.lag).abs() > tolerance.max(100.0 * AGREEMENT) * before.lag
             {
@@ -484,9 +484,6 @@ const MAX_PANELS: u32 = 64;
 
 /// Relative difference of two rules that is rounding. Chosen: a hundred roundings.
 const AGREEMENT: f64 = 1e-14;
-
-/// Most panels that are visited where they are halved. Chosen: five times what two ends of sixty halvings need.
-const MAX_HALVINGS: u32 = 1000;
 
 /// Gauss nodes for relative accuracy `e^-digits` on a panel: the Bernstein ellipse through the nearest singularity.
 #[inline(always)]
