@@ -5,7 +5,7 @@ use super::rise::Rise;
 use super::state::{State, down, up};
 use super::{Path, Problem};
 use crate::numerics::elementary::{exp, ln};
-use crate::protocol::{Moment, Motion};
+use crate::protocol::{Moment, Motion, equal_landmarks};
 
 /// Pulses on the ceiling that stand for chattering. Chosen: they cost 1e-4 more work in the case of docs/laws.md.
 pub const PULSES: usize = 16;
@@ -70,6 +70,11 @@ impl BangBang {
         self.pieces.last().map_or(0.0, |(piece, start, _)| start + self.duration_of(piece))
     }
 
+    /// The number of intervals of all pieces.
+    fn intervals(&self) -> u32 {
+        self.pieces.iter().map(|(.., intervals)| intervals).sum()
+    }
+
     fn duration_of(&self, piece: &Piece) -> f64 {
         match piece {
             Piece::Bound(arc) => arc.time(self.problem.ceiling),
@@ -105,13 +110,11 @@ impl Motion for BangBang {
     }
 
     fn landmarks(&self) -> Vec<f64> {
-        let all: u32 = self.pieces.iter().map(|(.., intervals)| intervals).sum();
-        (0..=all).map(|state| f64::from(state) / f64::from(all)).collect()
+        equal_landmarks(self.intervals() as usize)
     }
 
     fn at(&self, s: f64) -> Moment {
-        let all: u32 = self.pieces.iter().map(|(.., intervals)| intervals).sum();
-        let mut along = s.clamp(0.0, 1.0) * f64::from(all);
+        let mut along = s.clamp(0.0, 1.0) * f64::from(self.intervals());
         let last = self.pieces.len().saturating_sub(1);
         let mut found = [0.0, f64::NAN, f64::NAN];
         for (state, (piece, start, intervals)) in self.pieces.iter().enumerate() {
