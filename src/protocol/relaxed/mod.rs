@@ -331,7 +331,8 @@ impl Problem {
         if fall <= 0.0 || weakest <= self.to.below_floor {
             return 0.0;
         }
-        ln_1p(fall / (self.ln_ceiling - weakest)) / self.ceiling + rise::time_from(weakest, self.to.below_floor)
+        let rise = rise::time_from(weakest, self.to.below_floor, self.to.theta - exp(-weakest));
+        ln_1p(fall / (self.ln_ceiling - weakest)) / self.ceiling + rise
     }
 
     /// Whether the proof holds at every state that a path of duration `t_f` may reach.

@@ -52,29 +52,24 @@ impl ArcPoint {
 /// The least duration: `v = 1/(e theta)`, or the ceiling if that is less, up to `theta = 1/e`, then `v = 1`.
 pub(super) fn least_time(problem: &Problem) -> f64 {
     let (from, to) = (problem.from.below_floor, problem.to.below_floor);
-    if from > 1.0 + problem.ln_ceiling {
+    let turn = 1.0 + problem.ln_ceiling;
+    if from > turn {
         // ln(V theta) falls to -1 like e^-Vt.
-        let turn = 1.0 + problem.ln_ceiling;
         let on_ceiling = ln(from - problem.ln_ceiling) / problem.ceiling;
-        let rest = if to >= 1.0 { E / problem.to.v - 1.0 / problem.ceiling } else { -exp_m1(1.0 - turn) - ln(to) };
-        return on_ceiling + rest;
+        return on_ceiling + time_from(turn, to, problem.to.theta - 1.0 / (E * problem.ceiling));
     }
     fastest_time(problem)
 }
 
-/// The duration of `v = 1/(e theta)` up to `theta = 1/e`, then `v = 1`.
+/// The duration of the fastest rise of the problem.
 fn fastest_time(problem: &Problem) -> f64 {
-    let (from, to) = (problem.from.below_floor, problem.to.below_floor);
-    if to >= 1.0 {
-        return E * problem.span;
-    }
-    -exp_m1(1.0 - from) - ln(to)
+    time_from(problem.from.below_floor, problem.to.below_floor, problem.span)
 }
 
-/// Least duration of a rise between two values of `-ln theta`.
-pub(super) fn time_from(from: f64, to: f64) -> f64 {
+/// The least duration of a rise between two values of `-ln theta` by `span` of theta: `v = 1/(e theta)` up to `theta = 1/e`, then `v = 1`.
+pub(super) fn time_from(from: f64, to: f64, span: f64) -> f64 {
     match () {
-        () if to >= 1.0 => E * (exp(-to) - exp(-from)),
+        () if to >= 1.0 => E * span,
         () if from <= 1.0 => ln(from / to),
         () => -exp_m1(1.0 - from) - ln(to),
     }
