@@ -261,15 +261,6 @@ impl Folder {
         }
     }
 
-    /// Writes a part atomically.
-    ///
-    /// # Errors
-    ///
-    /// A file that cannot be written.
-    pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
-        atomic::write(&self.part(table, part), bytes)
-    }
-
     /// Files below the folder that do not belong to the dataset of `manifest`: temporary files of a run, and others.
     pub fn strays(&self, manifest: &Manifest) -> (Vec<PathBuf>, Vec<PathBuf>) {
         let mut strays = Vec::new();

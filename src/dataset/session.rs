@@ -138,7 +138,7 @@ impl Session {
     /// A file that cannot be written, or a dataset that no longer belongs to this run.
     pub fn write_part(&self, table: &str, part: u64, bytes: &[u8]) -> Result<(), DatasetError> {
         self.check()?;
-        self.folder.write_part(table, part, bytes)
+        atomic::write(&self.folder.part(table, part), bytes)
     }
 
     /// Compares the current manifest with that of this run.
