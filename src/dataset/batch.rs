@@ -28,13 +28,7 @@ pub fn batch(
     let view = row_index.view(rows.clone());
     let mut columns: Vec<ArrayRef> = Vec::with_capacity(layout.schema.fields().len());
     for axis in &layout.axes {
-        let mut cells = Vec::with_capacity(buffer.status.len());
-        if let Some(runs) = view.runs(*axis, rows.clone()) {
-            let values = runs.values();
-            for (step, length) in runs.over(rows.clone()) {
-                cells.resize(cells.len() + length, values[step]);
-            }
-        }
+        let cells = view.runs(*axis, rows.clone()).map_or_else(Vec::new, |runs| runs.cells(rows.clone()));
         let words = axis.words();
         columns.push(if words.is_empty() { Arc::new(Float64Array::from(cells)) } else { labels(&words, &cells)? });
     }

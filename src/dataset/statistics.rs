@@ -251,9 +251,7 @@ fn predicted(
     for axis in prediction.axes {
         let Some(runs) = view.runs(*axis, rows.clone()) else { continue };
         let unit = axis.unit(Scale::Model);
-        let values: Vec<f64> = runs.values().iter().map(|value| layout.units.scaled(unit, *value)).collect();
-        let each = runs.over(rows.clone()).flat_map(|(step, length)| std::iter::repeat_n(values[step], length));
-        axes.push((*axis, each.collect()));
+        axes.push((*axis, runs.map(|value| layout.units.scaled(unit, value)).cells(rows.clone())));
     }
     let mut point = Point::default();
     for (place, cell) in cells.iter().enumerate() {

@@ -188,6 +188,21 @@ impl Runs {
         &self.values
     }
 
+    /// The same runs with other values.
+    pub fn map(mut self, value: impl Fn(f64) -> f64) -> Runs {
+        self.values.iter_mut().for_each(|known| *known = value(*known));
+        self
+    }
+
+    /// The value of each of `rows`, a part of the rows.
+    pub fn cells(&self, rows: Range<u64>) -> Vec<f64> {
+        let mut cells = Vec::with_capacity((rows.end - rows.start) as usize);
+        for (step, length) in self.over(rows) {
+            cells.resize(cells.len() + length, self.values[step]);
+        }
+        cells
+    }
+
     /// The index into [`Runs::values`] of one row.
     pub fn step_of(&self, row: u64) -> usize {
         match &self.order {

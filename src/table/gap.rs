@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use super::failpoint;
 use super::optimum_cache::{LAW_AXES, cached_optimum, least_work, transition, work_error};
-use super::rows::on_all_threads;
+use super::rows::{RowChunk, in_chunks};
 use super::{Column, ColumnBuffer, Job, Projection, RunStats, Stopped, Table};
 use crate::grid::Quantity::{A, Alpha2, Alpha3, B, FinalVelocity, InitialVelocity, Law, Time, VelocityCeiling};
 use crate::grid::{Point, Quantity, Runs, Scale, View};
@@ -85,13 +85,7 @@ fn compute_by(
     let view = job.rows.view(rows.clone());
     let (groups, order) = groups(&view, job, &rows);
     let coefficients = Coefficients::new(job, view, &rows, order.as_deref());
-    let work = on_all_threads(chunks(&groups, buffer, job.projection), |chunk| {
-        job.signal.check()?;
-        let length = chunk.status.len() as u64;
-        let work = evaluate((job, prepare), &groups, &coefficients, chunk);
-        job.signal.advance(length);
-        Ok(work)
-    })?;
+    let work = in_chunks(job, buffer, CHUNK, |chunk| evaluate((job, prepare), &groups, &coefficients, chunk))?;
     if let Some(order) = order {
         scatter(buffer, &order);
     }
@@ -203,27 +197,19 @@ impl<'a> Coefficients<'a> {
     }
 
     /// `alpha_2 t_f` and `alpha_3 t_f^2` at `places`, all of one duration, in double precision.
-    fn fill(&self, places: Range<usize>, t_f: f64, out: [&mut Vec<f64>; 2]) {
-        for (i, out) in out.into_iter().enumerate() {
-            out.clear();
-            let Some(runs) = &self.runs[i] else { continue };
-            let values = runs.values();
-            match self.order {
-                None => {
-                    let rows = self.first + places.start as u64..self.first + places.end as u64;
-                    for (value, length) in runs.over(rows) {
-                        out.resize(out.len() + length, values[value]);
-                    }
-                }
-                Some(order) => out.extend(
-                    order[places.clone()].iter().map(|&offset| values[runs.step_of(self.first + u64::from(offset))]),
-                ),
-            }
+    fn values(&self, places: Range<usize>, t_f: f64) -> [Vec<f64>; 2] {
+        [0, 1].map(|i| {
+            let Some(runs) = &self.runs[i] else { return Vec::new() };
+            let mut values = match self.order {
+                None => runs.cells(self.row(places.start)..self.row(places.end)),
+                Some(_) => places.clone().map(|place| runs.values()[runs.step_of(self.row(place))]).collect(),
+            };
             if self.natural[i] {
                 let unit = self.unit(i, t_f).high;
-                out.iter_mut().for_each(|value| *value *= unit);
+                values.iter_mut().for_each(|value| *value *= unit);
             }
-        }
+            values
+        })
     }
 
     /// What turns a coefficient in natural units into that relative to the duration.
@@ -243,43 +229,25 @@ impl<'a> Coefficients<'a> {
     }
 }
 
-/// The work unit of a thread: places of one or several groups, and their cells; a column that is not requested is empty.
-struct RowChunk<'a> {
-    first_group: usize,
-    place: usize,
-    columns: [&'a mut [f64]; COLUMNS.len()],
-    status: &'a mut [Status],
-}
-
-/// Cuts a part into chunks.
-fn chunks<'a>(groups: &[LandscapeRows], buffer: &'a mut ColumnBuffer, projection: &Projection) -> Vec<RowChunk<'a>> {
-    let mut columns = [(); COLUMNS.len()].map(|()| <&mut [f64]>::default().chunks_mut(CHUNK));
-    for (column, &index) in buffer.columns.iter_mut().zip(projection.indices()) {
-        columns[index] = column.chunks_mut(CHUNK);
-    }
-    let chunk = |(number, status): (usize, &'a mut [Status])| {
-        let place = number * CHUNK;
-        let first_group = groups.partition_point(|group| group.places.end <= place);
-        let columns = columns.each_mut().map(|column| column.next().unwrap_or_default());
-        RowChunk { first_group, place, columns, status }
-    };
-    buffer.status.chunks_mut(CHUNK).enumerate().map(chunk).collect()
-}
-
-/// Computes a chunk, group by group.
+/// Computes a chunk, which has places of one or several groups, group by group.
 fn evaluate(
     (job, prepare): (&Job<'_>, Prepare),
     groups: &[LandscapeRows],
     coefficients: &Coefficients<'_>,
     chunk: RowChunk<'_>,
 ) -> RunStats {
-    let RowChunk { first_group, place: start, mut columns, status } = chunk;
-    columns.iter_mut().for_each(|column| column.fill(f64::NAN));
-    let (mut a_2, mut a_3) = (Vec::with_capacity(CHUNK), Vec::with_capacity(CHUNK));
+    let RowChunk { place: start, columns: requested, status } = chunk;
+    // A column that is not requested is empty.
+    let mut columns = [(); COLUMNS.len()].map(|()| <&mut [f64]>::default());
+    for (column, &index) in requested.into_iter().zip(job.projection.indices()) {
+        column.fill(f64::NAN);
+        columns[index] = column;
+    }
     let is_rounded = coefficients.natural.contains(&true);
     let (mut work_buffer, mut v_min_buffer, mut error_buffer) = (Vec::new(), Vec::new(), Vec::new());
     let mut work = RunStats::default();
     let end = start + status.len();
+    let first_group = groups.partition_point(|group| group.places.end <= start);
     for group in groups[first_group..].iter().take_while(|group| group.places.start < end) {
         let places = group.places.start.max(start)..group.places.end.min(end);
         failpoint::panic_at(places.clone().map(|place| coefficients.row(place)));
@@ -288,7 +256,7 @@ fn evaluate(
         let point = job.grid.scaled(&coefficients.view.point(group.row));
         let prepared = group.prepared.get_or_init(|| prepare(job, group, &point, &mut work));
         let t_f = point[Quantity::Time];
-        coefficients.fill(places.clone(), t_f, [&mut a_2, &mut a_3]);
+        let [a_2, a_3] = coefficients.values(places.clone(), t_f);
 
         let Some(landscape) = &prepared.landscape else {
             status.fill(Status::Infeasible);
