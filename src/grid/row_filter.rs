@@ -11,19 +11,13 @@ use roaring::RoaringBitmap;
 use super::block::{Block, Digits};
 use super::expression::{Expression, Scratch};
 use super::quantity::Quantity;
-use super::sampler::Sampler;
+use super::sampler::{BATCH_POINTS, Sampler};
 
 /// Combinations that a thread evaluates in one task, a multiple of 64. Chosen: some milliseconds.
 const CHUNK_COMBINATIONS: u64 = 1 << 16;
 
-/// Points that are evaluated at a time. Chosen: their columns fit the cache of a core.
-const BATCH_POINTS: u64 = 1 << 10;
-
 /// Greatest number of combinations that a condition or a computed axis reads. Chosen: their evaluation takes seconds, their bitmap 128 MiB.
 pub const MAX_COMBINATIONS: u64 = 1 << 30;
-
-/// Least number of points for evaluation on several threads. Chosen: some milliseconds, a hundred times the start of a thread.
-const MIN_PARALLEL_POINTS: u64 = 1 << 18;
 
 /// The rows of a product that a condition keeps.
 #[derive(Debug)]
@@ -65,7 +59,7 @@ impl RowFilter {
         let sampler = Sampler::new(block, &all, &[], Some(condition));
         let hidden = all.rows / combinations;
         let bits = |visible, scratch: &mut Scratch| evaluate(&sampler, condition, hidden, visible, scratch);
-        let bytes = in_chunks(combinations, all.rows, bits).concat();
+        let bytes = in_chunks(combinations, bits).concat();
         Some(RowFilter { levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
 
@@ -145,13 +139,13 @@ struct Location {
     inside: u64,
 }
 
-/// The results of `each` for the ranges below `count`, on all threads for many `points`.
-fn in_chunks<T: Send>(count: u64, points: u64, each: impl Fn(Range<u64>, &mut Scratch) -> T + Sync) -> Vec<T> {
+/// The results of `each` for the ranges below `count`, on all threads for more than one.
+fn in_chunks<T: Send>(count: u64, each: impl Fn(Range<u64>, &mut Scratch) -> T + Sync) -> Vec<T> {
     let chunks = 0..count.div_ceil(CHUNK_COMBINATIONS);
     let each = |scratch: &mut Scratch, number: u64| {
         each(number * CHUNK_COMBINATIONS..((number + 1) * CHUNK_COMBINATIONS).min(count), scratch)
     };
-    match (points >= MIN_PARALLEL_POINTS).then(|| rayon::ThreadPoolBuilder::new().build().ok()).flatten() {
+    match (count > CHUNK_COMBINATIONS).then(|| rayon::ThreadPoolBuilder::new().build().ok()).flatten() {
         Some(pool) => pool.install(|| chunks.into_par_iter().map_init(Scratch::default, each).collect()),
         None => {
             let mut scratch = Scratch::default();
@@ -225,7 +219,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
         }
         None
     };
-    let found = in_chunks(digits.rows, digits.rows, search).into_iter().flatten().next();
+    let found = in_chunks(digits.rows, search).into_iter().flatten().next();
     Some(found.map(|row| {
         let mut scratch = Scratch::default();
         sampler.pick(&[row], &mut scratch);

@@ -7,8 +7,8 @@ use super::block::{Block, Derived, Digit, Digits, Label};
 use super::expression::{Expression, Scratch};
 use super::quantity::Quantity;
 
-/// Greatest number of tabulated values of a range. Chosen: they fit the cache of a core.
-const MAX_TABLE_VALUES: u64 = 1 << 10;
+/// Points that are evaluated at a time, and greatest number of tabulated values of a range. Chosen: they fit the cache of a core.
+pub const BATCH_POINTS: u64 = 1 << 10;
 
 /// An evaluator of some quantities of a block over product rows.
 pub struct Sampler<'a> {
@@ -63,7 +63,7 @@ impl<'a> Sampler<'a> {
             let factor = &block.factors[digit.factor];
             for axis in factor.axes.iter().filter(|axis| wanted.contains(&axis.quantity)) {
                 let is_range = !matches!(axis.values, Values::List(_));
-                let table = (is_range && digit.len <= MAX_TABLE_VALUES)
+                let table = (is_range && digit.len <= BATCH_POINTS)
                     .then(|| (0..digit.len).map(|step| axis.values.at(step)).collect());
                 sources.push(Source { digit: *digit, content: Content::Axis(axis, table) });
             }

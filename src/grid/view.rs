@@ -6,10 +6,7 @@ use super::block::Digit;
 use super::expression::Scratch;
 use super::quantity::{Point, Quantity};
 use super::row_index::{RowIndex, Tuples};
-use super::sampler::Sampler;
-
-/// Points of an evaluation batch. Chosen: their columns fit the cache of a core.
-const BATCH_POINTS: usize = 1 << 10;
+use super::sampler::{BATCH_POINTS, Sampler};
 
 /// Rows of a table that are contiguous in the product of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -123,7 +120,7 @@ impl<'a> View<'a> {
                     last = step;
                     raw = (raw / stride + 1).saturating_mul(stride);
                 }
-                if rows.len() >= BATCH_POINTS {
+                if rows.len() as u64 >= BATCH_POINTS {
                     take(&sampler, &mut rows, axis.is_none());
                 }
             }
