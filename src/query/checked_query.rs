@@ -81,8 +81,8 @@ impl CheckedQuery {
             });
         };
         let Tables { sources, absent } = opened;
-        let [tables, read, windows] = Default::default();
-        let mut check = Check { sources, absent, tables, read, windows, fault: None, mixed: None };
+        let [tables, read, windows, aliases] = Default::default();
+        let mut check = Check { sources, absent, tables, read, windows, aliases, fault: None, mixed: None };
         walk(query.as_mut(), &mut check);
         if let Some(fault) = check.fault {
             return Err(fault);
@@ -93,7 +93,7 @@ impl CheckedQuery {
         let tables = sources.iter().map(|source| (source.name.clone(), columns(source))).collect();
         let units = units(&query, &tables);
         let read = sources.iter().filter(|source| check.read.contains(&source.name)).collect();
-        let comparisons = Comparisons::of(&mut query, read);
+        let comparisons = Comparisons::of(&mut query, read, check.aliases);
         let is_grouped = matches!(query.body.as_ref(), SetExpr::Select(select) if !is_empty(&select.group_by));
         let is_unordered = is_grouped && query.order_by.is_none() && query.limit_clause.is_none();
         walk(query.as_mut(), &mut PolarsDialect { words });
@@ -111,6 +111,8 @@ struct Check<'a> {
     read: HashSet<String>,
     /// Names of windows with an order.
     windows: HashSet<String>,
+    /// Names after AS in SELECT.
+    aliases: HashSet<String>,
     fault: Option<QueryError>,
     /// A column and an aggregate in one SELECT or its ORDER BY, without GROUP BY.
     mixed: Option<QueryError>,
@@ -201,6 +203,10 @@ impl VisitorMut for Check<'_> {
                 "filter in a subquery: FROM a LEFT JOIN (SELECT * FROM b WHERE ...) AS b ON a.x = b.x",
             );
         }
+        self.aliases.extend(select.projection.iter().filter_map(|item| match item {
+            SelectItem::ExprWithAlias { alias, .. } => Some(alias.value.clone()),
+            _ => None,
+        }));
         for NamedWindowDefinition(name, window) in &select.named_window {
             if matches!(window, NamedWindowExpr::WindowSpec(window) if !window.order_by.is_empty()) {
                 self.windows.insert(name.value.clone());

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::ops::ControlFlow;
 
-use sqlparser::ast::{BinaryOperator, Expr, Query, Select, SelectItem, UnaryOperator, Value, VisitorMut};
+use sqlparser::ast::{BinaryOperator, Expr, Query, UnaryOperator, Value, VisitorMut};
 
 use super::Source;
 use super::checked_query::name;
@@ -20,30 +20,11 @@ pub struct Comparisons {
 }
 
 impl Comparisons {
-    /// The comparisons in `query` with columns of the `sources` that it reads.
-    pub fn of(query: &mut Query, sources: Vec<&Source>) -> Comparisons {
-        let mut aliases = Aliases::default();
-        walk(query, &mut aliases);
-        let mut search = Search { sources, aliases: aliases.0, found: Comparisons::default() };
+    /// The comparisons in `query` with columns of the `sources` that it reads. `aliases` are its names after AS.
+    pub fn of(query: &mut Query, sources: Vec<&Source>, aliases: HashSet<String>) -> Comparisons {
+        let mut search = Search { sources, aliases, found: Comparisons::default() };
         walk(query, &mut search);
         search.found
-    }
-}
-
-/// The names after AS in a query.
-#[derive(Default)]
-struct Aliases(HashSet<String>);
-
-impl VisitorMut for Aliases {
-    type Break = ();
-
-    fn pre_visit_select(&mut self, select: &mut Select) -> ControlFlow<()> {
-        for item in &select.projection {
-            if let SelectItem::ExprWithAlias { alias, .. } = item {
-                self.0.insert(alias.value.clone());
-            }
-        }
-        ControlFlow::Continue(())
     }
 }
 

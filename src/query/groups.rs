@@ -115,10 +115,7 @@ fn bits(number: f64) -> u64 {
 fn codes(array: &dyn Array, rows: &[u32], words: &mut IndexSet<String>) -> Vec<u64> {
     let rows = rows.iter().map(|&row| row as usize);
     if let Some(numbers) = array.as_primitive_opt::<Float64Type>() {
-        return match array.null_count() {
-            0 => rows.map(|row| bits(numbers.value(row))).collect(),
-            _ => rows.map(|row| if array.is_null(row) { MISSING } else { bits(numbers.value(row)) }).collect(),
-        };
+        return rows.map(|row| if numbers.is_null(row) { MISSING } else { bits(numbers.value(row)) }).collect();
     }
     if let Some(flags) = array.as_boolean_opt() {
         return rows.map(|row| if flags.is_null(row) { MISSING } else { u64::from(flags.value(row)) }).collect();
