@@ -4,8 +4,8 @@ use std::io::{self, Write};
 use std::sync::Arc;
 
 use arrow_array::types::Int32Type;
-use arrow_array::{ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int64Array, RecordBatch, StringArray};
-use arrow_schema::{DataType as ArrowType, Schema as ArrowSchema, SchemaRef};
+use arrow_array::{Array, ArrayRef, BooleanArray, DictionaryArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::Schema;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
@@ -21,7 +21,7 @@ use super::comparisons::Comparisons;
 use super::plan;
 use super::scan::{Files, append};
 use super::streaming::{GroupPlan, Key, PARTS, StreamPlan};
-use crate::dataset::{Cell, field, guarded, label};
+use crate::dataset::{Cell, field, guarded};
 
 /// Rows of a batch. Chosen: few enough that a reader sees the first ones soon.
 const BATCH_ROWS: usize = 1 << 14;
@@ -115,21 +115,20 @@ impl Answer {
             Format::Parquet => {
                 let units = self.units.clone();
                 let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).build();
-                let mut writer: Option<(SchemaRef, ArrowWriter<Vec<u8>>)> = None;
+                let mut writer: Option<ArrowWriter<Vec<u8>>> = None;
                 let rows = self.for_each_batch(&mut |batch| {
-                    if writer.is_none() {
-                        without_lists(batch, "a Parquet answer")?;
-                        let schema = arrow_schema(batch, &units);
-                        let made = ArrowWriter::try_new(Vec::new(), schema.clone(), Some(properties.clone()))?;
-                        writer = Some((schema, made));
-                    }
-                    if let Some((schema, writer)) = &mut writer {
-                        writer.write(&record_batch(batch, schema)?)?;
-                        out.write_all(&std::mem::take(writer.inner_mut()))?;
-                    }
-                    Ok(())
+                    without_lists(batch, "a Parquet answer")?;
+                    let batch = record_batch(batch, &units)?;
+                    let writer = match &mut writer {
+                        Some(writer) => writer,
+                        none => {
+                            none.insert(ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties.clone()))?)
+                        }
+                    };
+                    writer.write(&batch)?;
+                    Ok(out.write_all(&std::mem::take(writer.inner_mut()))?)
                 })?;
-                if let Some((_, writer)) = writer {
+                if let Some(writer) = writer {
                     out.write_all(&writer.into_inner()?)?;
                 }
                 rows
@@ -324,31 +323,20 @@ fn without_lists(batch: &DataFrame, format: &str) -> PolarsResult<()> {
     ))
 }
 
-/// The Parquet schema of a batch, with units.
-fn arrow_schema(batch: &DataFrame, units: &[String]) -> SchemaRef {
-    let fields = batch.columns().iter().zip(units).map(|(column, unit)| {
-        let kind = match column.dtype() {
-            kind if kind.is_float() => ArrowType::Float64,
-            kind if kind.is_integer() => ArrowType::Int64,
-            DataType::Boolean => ArrowType::Boolean,
-            kind if kind.is_categorical() => label(),
-            _ => ArrowType::Utf8,
-        };
-        field(column.name(), kind, true, unit, "")
-    });
-    Arc::new(ArrowSchema::new(fields.collect::<Vec<_>>()))
-}
-
-/// A batch as a record batch for Parquet.
-fn record_batch(batch: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, AnswerError> {
-    let mut arrays: Vec<ArrayRef> = Vec::new();
-    for (column, field) in batch.columns().iter().zip(schema.fields()) {
+/// A batch as a record batch for Parquet, with units.
+fn record_batch(batch: &DataFrame, units: &[String]) -> Result<RecordBatch, AnswerError> {
+    let (mut fields, mut arrays) = (Vec::new(), Vec::new());
+    for (column, unit) in batch.columns().iter().zip(units) {
         let series = column.as_materialized_series();
-        arrays.push(match field.data_type() {
-            ArrowType::Float64 => Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>()),
-            ArrowType::Int64 => Arc::new(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect::<Int64Array>()),
-            ArrowType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
-            ArrowType::Dictionary(..) => {
+        let array: ArrayRef = match column.dtype() {
+            kind if kind.is_float() => {
+                Arc::new(series.cast(&DataType::Float64)?.f64()?.iter().collect::<Float64Array>())
+            }
+            kind if kind.is_integer() => {
+                Arc::new(series.strict_cast(&DataType::Int64)?.i64()?.iter().collect::<Int64Array>())
+            }
+            DataType::Boolean => Arc::new(series.bool()?.iter().collect::<BooleanArray>()),
+            kind if kind.is_categorical() => {
                 let text = series.cast(&DataType::String)?;
                 Arc::new(text.str()?.iter().collect::<DictionaryArray<Int32Type>>())
             }
@@ -359,7 +347,9 @@ fn record_batch(batch: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, An
                 };
                 Arc::new(series.rechunk().iter().map(word).collect::<StringArray>())
             }
-        });
+        };
+        fields.push(field(column.name(), array.data_type().clone(), true, unit, ""));
+        arrays.push(array);
     }
-    Ok(RecordBatch::try_new(schema.clone(), arrays).map_err(ParquetError::from)?)
+    Ok(RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).map_err(ParquetError::from)?)
 }
