@@ -74,19 +74,9 @@ pub enum DatasetError {
     /// An error of the operating system.
     #[error("{path}: cannot {action}: {source}\n  help: {}", io_help(action, source))]
     Io { path: String, action: &'static str, source: io::Error },
-    /// A sample of a table could not be encoded.
-    #[error("cannot encode a sample: {0}")]
-    Sample(parquet::errors::ParquetError),
-    /// A part could not be encoded.
-    #[error("{path}: cannot encode: {source}")]
-    Encode { path: String, source: parquet::errors::ParquetError },
-}
-
-impl DatasetError {
-    /// Part number `part` of `table` could not be encoded.
-    pub fn encode(folder: &Folder, table: &str, part: u64, source: parquet::errors::ParquetError) -> DatasetError {
-        DatasetError::Encode { path: folder.part(table, part).display().to_string(), source }
-    }
+    /// A part, or a sample of one, could not be encoded.
+    #[error("cannot encode a part: {0}")]
+    Encode(#[from] parquet::errors::ParquetError),
 }
 
 /// What to do after an error of the operating system.

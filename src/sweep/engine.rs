@@ -373,10 +373,9 @@ impl<'a> TableRun<'a> {
 
     /// The bytes of a part, which is counted.
     fn encode(&self, number: u64, buffer: &ColumnBuffer) -> Result<Vec<u8>, RunError> {
-        let (Run { folder, session, .. }, name) = (self.run, &self.table.name);
-        let footer = Footer::new(&session.manifest, name, self.table.rows_of(number));
-        let (bytes, statistics) = encode(&self.layout, self.job.rows, buffer, &footer)
-            .map_err(|source| DatasetError::encode(folder, name, number, source))?;
+        let footer = Footer::new(&self.run.session.manifest, &self.table.name, self.table.rows_of(number));
+        let encoded = encode(&self.layout, self.job.rows, buffer, &footer);
+        let (bytes, statistics) = encoded.map_err(DatasetError::Encode)?;
         self.count(statistics);
         Ok(bytes)
     }

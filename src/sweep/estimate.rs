@@ -321,7 +321,7 @@ impl TableSampler<'_> {
         buffer.resize((rows.end - rows.start) as usize);
         let work = request.table.compute(job, rows.clone(), &mut buffer)?;
         let footer = Footer::new(self.manifest, request.table.name(), rows.clone());
-        let (bytes, _) = encode(&self.layout, job.rows, &buffer, &footer).map_err(DatasetError::Sample)?;
+        let (bytes, _) = encode(&self.layout, job.rows, &buffer, &footer).map_err(DatasetError::Encode)?;
         let optima = if *optimum > 0.0 { work.optima } else { 0 };
         let seconds = start.elapsed().as_secs_f64() - optima as f64 * optimum;
         Ok((rows.end - rows.start, seconds.max(0.0), bytes.len()))
