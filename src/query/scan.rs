@@ -70,7 +70,7 @@ impl Files {
             sound(path, || {
                 self.batches(path, groups.columns(), &self.conditions, None, &mut |batch, kept| {
                     aggregation.add(&batch, &kept);
-                    Ok(kept.len())
+                    Ok(())
                 })
             })?;
         }
@@ -225,15 +225,15 @@ fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), ParquetError> {
 }
 
 impl Files {
-    /// Passes the columns `names` of a file and those of `conditions` to `take`, one row group at a time, with the rows that match `conditions`.
-    /// Skips row groups without such rows. Ends when `take`, which returns the number of kept rows, has `most`.
+    /// Passes the columns `names` of a file and those of `conditions` to `take`, batch by batch, with the rows that match `conditions`. Skips row
+    /// groups without such rows. Reads at most the first `most` rows.
     fn batches<'a>(
         &self,
         path: &Path,
         names: impl Iterator<Item = &'a str>,
         conditions: &'a [Condition],
         most: Option<usize>,
-        take: &mut dyn FnMut(RecordBatch, Vec<bool>) -> Result<usize, ParquetError>,
+        take: &mut dyn FnMut(RecordBatch, Vec<bool>) -> Result<(), ParquetError>,
     ) -> Result<(), ParquetError> {
         let (file, metadata) = open(path)?;
         let names: BTreeSet<&str> = names.chain(conditions.iter().map(|condition| condition.column.as_str())).collect();
@@ -250,30 +250,21 @@ impl Files {
         let allows = |group: &RowGroupMetaData| !is_ours || conditions.iter().all(|condition| condition.allows(group));
         let wanted: Vec<&str> = names.iter().copied().collect();
         let mask = dataset::frame::projection(metadata.parquet_schema(), &wanted);
-        let mut missing = most;
-        for (index, group) in metadata.metadata().row_groups().iter().enumerate() {
-            if missing == Some(0) {
-                break;
-            }
-            if !allows(group) {
-                continue;
-            }
-            let rows = usize::try_from(group.num_rows()).unwrap_or(0);
-            let wanted = missing.map_or(rows, |missing| rows.min(missing));
-            let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file.try_clone()?, metadata.clone());
-            let reader = builder
-                .with_row_groups(vec![index])
-                .with_projection(mask.clone())
-                .with_batch_size(wanted.max(1))
-                .with_limit(wanted)
-                .build()?;
-            let mut took = 0;
-            for batch in reader {
-                let batch = batch?;
-                let kept = kept(conditions, &batch);
-                took += take(batch, kept)?;
-            }
-            missing = missing.map(|missing| missing - took.min(missing));
+        let groups = metadata.metadata().row_groups();
+        let allowed = (0..groups.len()).filter(|&group| allows(&groups[group])).collect();
+        // In parts, which have row groups of one size, a batch is a row group.
+        let rows = groups.iter().filter_map(|group| usize::try_from(group.num_rows()).ok()).max().unwrap_or(0);
+        let mut builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata.clone())
+            .with_row_groups(allowed)
+            .with_projection(mask)
+            .with_batch_size(rows.max(1));
+        if let Some(most) = most {
+            builder = builder.with_limit(most);
+        }
+        for batch in builder.build()? {
+            let batch = batch?;
+            let kept = kept(conditions, &batch);
+            take(batch, kept)?;
         }
         Ok(())
     }
@@ -300,8 +291,7 @@ impl Files {
                 true => batch,
                 false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
             };
-            append(&mut frame, columns(&batch, names)?).map_err(foreign)?;
-            Ok(batch.num_rows())
+            append(&mut frame, columns(&batch, names)?).map_err(foreign)
         })?;
         Ok(frame)
     }
