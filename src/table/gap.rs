@@ -147,17 +147,10 @@ impl PreparedLandscape {
 /// The groups of a part, and the row of each place in the order of computation, if the orders differ.
 fn groups(view: &View<'_>, job: &Job<'_>, rows: &Range<u64>) -> (Vec<LandscapeRows>, Option<Vec<u32>>) {
     let mut runs = view.tuples(&job.tuples, rows.clone());
-    let in_order = |runs: &[(u64, Range<u64>)]| {
-        let mut tuples: Vec<u64> = runs.iter().map(|(tuple, _)| *tuple).collect();
-        tuples.sort_unstable();
-        tuples.windows(2).all(|pair| pair[0] != pair[1])
-    };
-    let order = if in_order(&runs) {
-        None
-    } else {
+    let order = (!runs.is_sorted_by_key(|(tuple, _)| *tuple)).then(|| {
         runs.sort_by_key(|(tuple, _)| *tuple);
-        Some(runs.iter().flat_map(|(_, run)| run.clone()).map(|row| (row - rows.start) as u32).collect())
-    };
+        runs.iter().flat_map(|(_, run)| run.clone()).map(|row| (row - rows.start) as u32).collect()
+    });
     let mut groups: Vec<LandscapeRows> = Vec::new();
     let mut place = 0;
     for (tuple, run) in runs {
