@@ -36,12 +36,11 @@ pub struct Chunk {
     pub statistics: Statistics,
 }
 
-/// A new data page of up to `size` bytes, beginning with the definition levels of a column with nulls: 1 for a value, 0 for null.
-pub fn page(present: Option<&Runs>, size: usize) -> Vec<u8> {
-    let Some(present) = present else { return Vec::with_capacity(size) };
+/// A new data page, beginning with the definition levels of a column with nulls: 1 for a value, 0 for null.
+pub fn page(present: Option<&Runs>) -> Vec<u8> {
+    let Some(present) = present else { return Vec::new() };
     let levels = rle::encode(present.iter().copied(), 1);
-    let mut data = Vec::with_capacity(4 + levels.len() + size);
-    data.extend((levels.len() as u32).to_le_bytes());
+    let mut data = Vec::from((levels.len() as u32).to_le_bytes());
     data.extend(levels);
     data
 }

@@ -56,7 +56,7 @@ fn chunk(
     let mut with_value = 0;
     let codes = rle::encode(runs.inspect(|(_, length)| with_value += length), bit_width);
     let rows = present.map_or(with_value, |present| present.iter().map(|(_, length)| length).sum());
-    let mut data = page(present, 1 + codes.len());
+    let mut data = page(present);
     data.push(bit_width);
     data.extend(codes);
     Chunk {

@@ -10,7 +10,7 @@ use super::numbers::presence;
 pub fn chunk(cells: &[f64]) -> Chunk {
     let present = presence(cells);
     let flags: Vec<bool> = cells.iter().filter(|cell| !cell.is_nan()).map(|&cell| cell != 0.0).collect();
-    let mut data = page(Some(&present), flags.len().div_ceil(8));
+    let mut data = page(Some(&present));
     data.extend(flags.chunks(8).map(|eight| eight.iter().rev().fold(0, |byte, &flag| byte << 1 | u8::from(flag))));
     let range = flags.iter().min().copied().zip(flags.iter().max().copied());
     let (least, greatest) = range.unzip();

@@ -26,7 +26,7 @@ pub fn chunk(cells: &[f64]) -> Chunk {
     if let Some((distinct, runs)) = repeating(&values) {
         return dictionary::numbers(&distinct, runs.into_iter(), Some(&present));
     }
-    let mut data = page(Some(&present), 8 * values.len());
+    let mut data = page(Some(&present));
     let start = data.len();
     data.resize(start + 8 * values.len(), 0);
     split(&values, &mut data[start..]);

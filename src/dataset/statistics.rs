@@ -360,7 +360,7 @@ impl LeastGaps {
         let is_same = |one: &Row, other: &Row| keys.iter().all(|&key| one.cell(key).is_same(other.cell(key)));
         self.many |= other.many;
         for candidate in other.each {
-            match self.each.iter_mut().find(|known| self.many || is_same(&known.row, &candidate.row)) {
+            match self.each.iter_mut().find(|known| is_same(&known.row, &candidate.row)) {
                 Some(known) => {
                     known.first = known.first.min(candidate.first);
                     if is_less(&candidate.row, &known.row) {
