@@ -133,8 +133,9 @@ impl Check<'_> {
 
     /// Records the first of `columns` in or after a SELECT of an aggregate without GROUP BY.
     fn mix(&mut self, select: &Select, mut columns: impl Iterator<Item = String>) {
+        let mut items = select.projection.iter().filter_map(expression);
         if is_empty(&select.group_by)
-            && let Some(aggregate) = select.projection.iter().filter_map(expression).find_map(first_plain_aggregate)
+            && let Some(aggregate) = items.find_map(|item| first_part(item, is_plain_aggregate, |_| false))
             && let Some(column) = columns.next()
         {
             // polars would repeat the aggregate in every row, and order the only row.
@@ -221,7 +222,7 @@ impl VisitorMut for Check<'_> {
         self.mix(select, select.projection.iter().filter_map(first_bare_column));
         let is_grouped = select.having.is_some() || !is_empty(&select.group_by);
         let mut items = select.projection.iter().filter_map(expression).chain(&select.qualify);
-        if is_grouped && let Some(window) = items.find_map(first_window) {
+        if is_grouped && let Some(window) = items.find_map(|item| first_part(item, is_window, |_| false)) {
             return self.refuse(
                 format!("`{window}`: OVER and GROUP BY in one SELECT"),
                 "group in a subquery: SELECT ... OVER (...) FROM (SELECT ... GROUP BY ...) AS t",
@@ -346,19 +347,9 @@ fn is_plain_aggregate(expression: &Expr) -> bool {
     matches!(expression, Expr::Function(function) if function.over.is_none() && is_aggregate(function))
 }
 
-/// The first window function of an expression.
-fn first_window(expression: &Expr) -> Option<String> {
-    first_part(expression, is_window, |_| false)
-}
-
 /// The first aggregate or window function of an expression.
 fn first_aggregate(expression: &Expr) -> Option<String> {
     first_part(expression, |part| is_window(part) || is_plain_aggregate(part), |_| false)
-}
-
-/// The first aggregate of an expression without OVER.
-fn first_plain_aggregate(expression: &Expr) -> Option<String> {
-    first_part(expression, is_plain_aggregate, |_| false)
 }
 
 /// The first column of an item of SELECT outside aggregates and subqueries, as text.
@@ -618,17 +609,14 @@ struct PolarsDialect {
 }
 
 impl PolarsDialect {
-    /// Whether an expression is a column of words.
-    fn is_words(&self, expression: &Expr) -> bool {
-        match expression {
-            Expr::Identifier(name) => self.words.contains(&name.value),
-            Expr::CompoundIdentifier(names) => names.last().is_some_and(|name| self.words.contains(&name.value)),
-            _ => false,
-        }
-    }
-
+    /// Makes text of a column of words.
     fn as_text(&self, expression: &mut Expr) {
-        if self.is_words(expression) {
+        let column = match &*expression {
+            Expr::Identifier(name) => Some(name),
+            Expr::CompoundIdentifier(names) => names.last(),
+            _ => None,
+        };
+        if column.is_some_and(|name| self.words.contains(&name.value)) {
             *expression = cast(expression.clone(), DataType::Varchar(None));
         }
     }
