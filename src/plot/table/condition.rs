@@ -54,43 +54,8 @@ impl Condition {
     ///
     /// A condition without a column, a comparison and a value.
     pub fn all(text: &str) -> Result<Vec<Condition>, PlotError> {
-        const AND: &str = " and ";
-        let is_and = |rest: &str| rest.get(..AND.len()).is_some_and(|start| start.eq_ignore_ascii_case(AND));
-        let (mut all, mut from, mut quote, mut depth) = (Vec::new(), 0, None, 0);
-        for (place, letter) in text.char_indices() {
-            // A separator in quotes belongs to a word, one in parentheses to a list.
-            let separator = match (letter, quote) {
-                ('"' | '\'', None) if text[..place].trim_end().ends_with(['=', '<', '>', '(', ',']) => {
-                    quote = Some(letter);
-                    continue;
-                }
-                (_, Some(opening)) => {
-                    quote = quote.filter(|_| letter != opening);
-                    continue;
-                }
-                ('(', _) => {
-                    depth += 1;
-                    continue;
-                }
-                (')', _) => {
-                    depth -= 1;
-                    continue;
-                }
-                _ if depth > 0 => continue,
-                (',', _) => ",",
-                (' ', _) if is_and(&text[place..]) => AND,
-                _ => continue,
-            };
-            if place >= from {
-                all.push(Condition::one(&text[from..place])?);
-                from = place + separator.len();
-            }
-        }
-        if quote.is_some() {
-            return Err(no_condition(text));
-        }
-        all.push(Condition::one(&text[from..])?);
-        Ok(all)
+        let pieces = split(text, &[",", " and "]).ok_or_else(|| no_condition(text))?;
+        pieces.into_iter().map(Condition::one).collect()
     }
 
     fn one(text: &str) -> Result<Condition, PlotError> {
@@ -105,7 +70,7 @@ impl Condition {
         let (column, typed) = (text[..place].trim(), text[place + length..].trim());
         let values = if list == Some(place) {
             let inside = typed.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).ok_or_else(wrong)?;
-            items(inside).into_iter().map(unquoted).collect()
+            split(inside, &[","]).ok_or_else(wrong)?.into_iter().map(|item| unquoted(item.trim())).collect()
         } else {
             unquoted(typed).map(|value| vec![value])
         };
@@ -216,21 +181,31 @@ fn is_equal(number: f64, value: f64) -> bool {
     number == value || value != 0.0 && value.is_finite() && (number - value).abs() <= (0.5 + 1e-6) * last_digit
 }
 
-/// The items of a list, separated by commas outside quotes.
-fn items(list: &str) -> Vec<&str> {
-    let mut quote = None;
-    let separates = |letter: char| match quote {
-        None if letter == '"' || letter == '\'' => {
-            quote = Some(letter);
-            false
+/// The pieces of a text between `separators` in any case, outside quotes and parentheses; `None` for an open quote.
+fn split<'a>(text: &'a str, separators: &[&str]) -> Option<Vec<&'a str>> {
+    let (mut pieces, mut from, mut quote, mut depth) = (Vec::new(), 0, None, 0);
+    for (place, letter) in text.char_indices() {
+        // A quote begins a value; elsewhere it is an apostrophe.
+        let begins = |before: &str| before.is_empty() || before.ends_with(['=', '<', '>', '(', ',']);
+        let starts = |separator: &&&str| {
+            text[place..].get(..separator.len()).is_some_and(|start| start.eq_ignore_ascii_case(separator))
+        };
+        match (letter, quote) {
+            (_, Some(opening)) => quote = quote.filter(|_| letter != opening),
+            ('"' | '\'', None) if begins(text[..place].trim_end()) => quote = Some(letter),
+            ('(', None) => depth += 1,
+            (')', None) => depth -= 1,
+            _ if depth > 0 || place < from => {}
+            _ => {
+                if let Some(separator) = separators.iter().find(starts) {
+                    pieces.push(&text[from..place]);
+                    from = place + separator.len();
+                }
+            }
         }
-        None => letter == ',',
-        Some(opening) => {
-            quote = quote.filter(|_| letter != opening);
-            false
-        }
-    };
-    list.split(separates).map(str::trim).collect()
+    }
+    pieces.push(&text[from..]);
+    quote.is_none().then_some(pieces)
 }
 
 /// A typed value without its quotes; `None` for no value, or a sign outside quotes, which belongs to a second condition.
