@@ -139,6 +139,9 @@ impl FilteredTable {
         let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
         let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
+        // The default for a damaged spec.
+        let spec = Spec::parse(&manifest.spec).unwrap_or_default();
+        let rtol = spec.tables.get(name).and_then(|table| table.rtol).unwrap_or(spec.accuracy.rtol);
         let mut filtered = FilteredTable {
             table: name.to_owned(),
             headings,
@@ -148,8 +151,8 @@ impl FilteredTable {
             labels: Vec::new(),
             common_labels: Vec::new(),
             of_points: Vec::new(),
-            gridded: Gridded::of(&manifest.spec),
-            least_gap: if DIFFERENCES.contains(&name) { rtol(&manifest.spec, name) } else { 0.0 },
+            gridded: Gridded::of(&spec),
+            least_gap: if DIFFERENCES.contains(&name) { rtol } else { 0.0 },
             parts,
             conditions: conditions.to_vec(),
         };
@@ -527,12 +530,6 @@ impl FilteredTable {
             self.table
         )))
     }
-}
-
-/// The accuracy of a table of a spec; the default for a damaged spec.
-fn rtol(spec: &str, table: &str) -> f64 {
-    let spec = Spec::parse(spec).unwrap_or_default();
-    spec.tables.get(table).and_then(|table| table.rtol).unwrap_or(spec.accuracy.rtol)
 }
 
 /// The bits of numbers as a key, with one zero.

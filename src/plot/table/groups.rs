@@ -10,6 +10,7 @@ use crate::grid::Quantity;
 use crate::plot::colour::MAX_SERIES;
 use crate::plot::{Figure, PlotError, label};
 use crate::protocol::shortcut::FAMILIES;
+use crate::sweep::{AxisForm, AxisSpec, BlockSpec, Spec};
 
 /// Greatest number of groups; with more, all rows are one group. Chosen: far more than a picture shows.
 const MAX_GROUPS: usize = 4096;
@@ -71,32 +72,26 @@ pub struct Gridded {
 }
 
 impl Gridded {
-    /// The grid axes of a spec; empty for a damaged spec.
-    pub fn of(spec: &str) -> Gridded {
+    /// The grid axes of a spec.
+    pub fn of(spec: &Spec) -> Gridded {
         let mut gridded = Gridded::default();
-        let Ok(spec) = spec.parse::<toml::Table>() else { return gridded };
-        let blocks = spec.get("block").and_then(toml::Value::as_array).into_iter().flatten();
-        for part in [&spec].into_iter().chain(blocks.filter_map(toml::Value::as_table)) {
-            let is_range = |value: &toml::Value| match value {
-                toml::Value::Array(values) => values.len() > 1,
-                toml::Value::Table(table) => table.contains_key("linspace") || table.contains_key("geomspace"),
-                _ => false,
-            };
-            let axes = || part.get("axes").and_then(toml::Value::as_table).into_iter().flatten();
-            gridded.axes.extend(axes().filter(|(_, value)| is_range(value)).map(|(name, _)| name.clone()));
-            if part.contains_key("points") {
-                gridded.outside_file.get_or_insert_default().extend(axes().map(|(name, _)| name.clone()));
+        for (_, BlockSpec { axes, zip, points, .. }) in spec.blocks() {
+            if points.is_some() {
+                gridded.outside_file.get_or_insert_default().extend(axes.keys().cloned());
             }
-            let zipped = part.get("zip").and_then(toml::Value::as_array).into_iter().flatten();
-            let names = |zip: &toml::Value| {
-                zip.as_array().into_iter().flatten().filter_map(|name| Some(name.as_str()?.to_owned())).collect()
-            };
-            gridded.tied.extend(zipped.map(names));
-            gridded.tied.extend(axes().filter_map(|(name, value)| {
-                let expression = value.get("expr")?.as_str()?;
-                let words = expression.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned);
-                Some(words.chain([name.clone()]).collect())
-            }));
+            gridded.tied.extend(zip.iter().cloned());
+            for (name, axis) in axes {
+                let is_range = match axis {
+                    AxisSpec::One(_) => false,
+                    AxisSpec::List(values) => values.len() > 1,
+                    AxisSpec::Form(form) => form.linspace.is_some() || form.geomspace.is_some(),
+                };
+                gridded.axes.extend(is_range.then(|| name.clone()));
+                if let AxisSpec::Form(AxisForm { expr: Some(expression), .. }) = axis {
+                    let words = expression.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned);
+                    gridded.tied.push(words.chain([name.clone()]).collect());
+                }
+            }
         }
         gridded
     }
@@ -515,15 +510,15 @@ mod tests {
 
     #[test]
     fn axes_of_the_grid_are_free_unless_one_they_are_zipped_with_is_drawn() {
-        let gridded = Gridded::of(
+        let gridded = |axes: &str| Gridded::of(&Spec::parse(&format!("name = \"grid\"\n{axes}")).expect("a spec"));
+        let zipped = gridded(
             "zip = [[\"a\", \"b\"]]\n[axes]\na = [0.03, 0.05]\nb = [0.05, 0.03]\nt_f = { geomspace = [0.01, 1.0, 5] }\nv_i = 3.0\n\
              v_f = { expr = \"10 * v_i\" }\nk = { sobol = [1.0, 2.0, 8], seed = 1 }\n",
         );
-        let free = |name, drawn: &[&str]| gridded.is_free(name, drawn);
+        let free = |name, drawn: &[&str]| zipped.is_free(name, drawn);
         assert!(free("t_f", &["v_f"]) && free("a", &["t_f"]) && !free("a", &["b"]));
         assert!(!free("v_i", &[]) && !free("v_f", &[]) && !free("k", &[]));
-        let blocks =
-            Gridded::of("[[block]]\n[block.axes]\nt_f = [1.0, 2.0]\n[[block]]\n[block.axes]\nb = [1.0, 2.0]\n");
+        let blocks = gridded("[[block]]\n[block.axes]\nt_f = [1.0, 2.0]\n[[block]]\n[block.axes]\nb = [1.0, 2.0]\n");
         assert!(blocks.is_free("t_f", &["b"]) && blocks.is_free("b", &["t_f"]));
     }
 

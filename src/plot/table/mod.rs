@@ -16,6 +16,7 @@ use super::{PlotError, label};
 use crate::dataset::{Folder, Manifest};
 use crate::grid::{Quantity, Scale};
 use crate::model::{Friction, Units};
+use crate::sweep::{ModelSpec, Spec};
 
 use choice::Shape;
 pub use condition::Condition;
@@ -224,12 +225,9 @@ impl TablePicture {
 impl Source {
     /// The dataset in `folder`, whose values are in `units`.
     pub fn new(folder: Folder, manifest: Manifest, units: Units) -> Source {
-        let spec: Option<toml::Table> = manifest.spec.parse().ok();
-        let model = spec.as_ref().and_then(|spec| spec.get("model"));
-        let bound = model.and_then(|model| model.get("velocity_bound")).and_then(toml::Value::as_bool);
-        let friction = model.and_then(|model| model.get("friction")).and_then(toml::Value::as_str);
-        let is_logarithmic = friction.is_none_or(|friction| friction == Friction::Log.name());
-        Source { manifest, folder, bounded: bound.unwrap_or(true), is_logarithmic, units }
+        let ModelSpec { velocity_bound, friction, .. } = Spec::parse(&manifest.spec).unwrap_or_default().model;
+        let is_logarithmic = friction == Friction::Log.name();
+        Source { manifest, folder, bounded: velocity_bound, is_logarithmic, units }
     }
 
     /// Names of the tables with a picture.
