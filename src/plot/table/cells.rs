@@ -93,18 +93,12 @@ impl AxisCells {
         self.scale.value(low + (place - before as f64) * (high - low))
     }
 
-    /// The cell whose centre is nearest to a fraction of the scale.
-    pub fn nearest(&self, fraction: f64) -> usize {
-        let value = self.scale.value(fraction);
-        let after = self.middles.partition_point(|&middle| middle < value);
-        if after == 0 {
-            return 0;
-        }
-        if after == self.len() {
-            return after - 1;
-        }
-        let (left, right) = (self.scale.fraction(self.middles[after - 1]), self.scale.fraction(self.middles[after]));
-        if fraction - left <= right - fraction { after - 1 } else { after }
+    /// For each of `count` equal intervals of the scale, the cell with the nearest centre.
+    pub fn nearest(&self, count: usize) -> Vec<usize> {
+        let centres: Vec<f64> = self.middles.iter().map(|&middle| self.scale.fraction(middle)).collect();
+        let borders: Vec<f64> = centres.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        let middle = |interval: usize| (interval as f64 + 0.5) / count as f64;
+        (0..count).map(|interval| borders.partition_point(|&border| border < middle(interval))).collect()
     }
 }
 
@@ -124,7 +118,7 @@ mod tests {
         assert!(cells.exact && cells.even && cells.scale.log);
         assert!((cells.scale.low - 0.1f64.sqrt()).abs() < 1e-12);
         assert_eq!([1.0, 100.0, 50.0].map(|value| cells.place(value)), [Some(0), Some(2), None]);
-        assert_eq!(cells.nearest(0.99), 3);
+        assert_eq!(cells.nearest(8), [0, 0, 1, 1, 2, 2, 3, 3]);
     }
 
     #[test]

@@ -356,16 +356,13 @@ fn nothing(sheets: &[PanelCells]) -> String {
 
 /// The image of a panel: one pixel for each cell if cells are equally wide, else [`PIXELS`] along the axis.
 fn pixels(cells: &[AxisCells; 2], colour: impl Fn(usize) -> Option<[u8; 3]>) -> Option<Vec<u8>> {
-    let sizes = [0, 1].map(|axis| if cells[axis].even { cells[axis].len() } else { PIXELS });
-    let place = |axis: usize, pixel: usize| {
-        if cells[axis].even { pixel } else { cells[axis].nearest((pixel as f64 + 0.5) / sizes[axis] as f64) }
-    };
-    let mut pixels = Vec::with_capacity(sizes[0] * sizes[1]);
-    for line in (0..sizes[1]).rev() {
-        let start = place(1, line) * cells[0].len();
-        pixels.extend((0..sizes[0]).map(|column| colour(start + place(0, column))));
-    }
-    image(sizes[0], &pixels)
+    let [columns, rows] = cells.each_ref().map(|cells| match cells.even {
+        true => (0..cells.len()).collect(),
+        false => cells.nearest(PIXELS),
+    });
+    let cell = |row: &usize, column: &usize| row * cells[0].len() + column;
+    let pixels = rows.iter().rev().flat_map(|row| columns.iter().map(|column| colour(cell(row, column))));
+    image(columns.len(), &pixels.collect::<Vec<_>>())
 }
 
 /// The numbers and words of a panel under the pointer.
