@@ -3,7 +3,7 @@
 use super::filtered::{FilteredTable, Values};
 use super::lines;
 use super::map;
-use super::{Request, TablePicture};
+use super::{PROTOCOL_DEFAULTS, Request, TablePicture};
 use crate::plot::PlotError;
 use crate::plot::colour::MAX_SERIES;
 
@@ -74,9 +74,10 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
         )));
     }
     let of_at_least = |values: usize| choice.find(defaults.x, colour, values);
-    let preferred = || of_at_least(defaults.least_map.min(MANY_VALUES)).or_else(|| of_at_least(3));
+    // Tables without a map prefer as many values as most maps have.
+    let preferred = || of_at_least(defaults.least_map.min(PROTOCOL_DEFAULTS.least_map)).or_else(|| of_at_least(3));
     let any = || choice.varying.first().map(|axis| axis.name.clone());
-    let preferred = || preferred().or_else(|| choice.longest()).or_else(|| of_at_least(2)).or_else(any);
+    let preferred = || preferred().or_else(|| choice.longest()).or_else(any);
     let x = x.map(str::to_owned).or_else(preferred).ok_or_else(|| choice.one_row())?;
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
@@ -92,9 +93,6 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
     Ok(Shape::Lines(lines::LineColumns { x, y, series, has_symbols: false }))
 }
-
-/// Number of values of an axis that is preferred for lines. Chosen: enough for a curve.
-const MANY_VALUES: usize = 12;
 
 /// The inputs of a choice.
 struct Choice<'a> {
