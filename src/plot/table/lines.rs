@@ -12,7 +12,7 @@ use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, coincide, label};
 
 /// Greatest number of positions along a line; with more rows, several fall on one position. Chosen: more are invisible in print.
-const MAX_POSITIONS: usize = 4096;
+pub const MAX_POSITIONS: usize = 4096;
 
 /// Range of a column, relative to its greatest value, below which it is constant. Chosen: the range is rounding.
 pub const CONSTANT_RTOL: f64 = 1e-9;

@@ -1,16 +1,15 @@
 //! Pictures of reduced landscapes: quantiles of the gap over an axis, and histograms.
 
+use super::PROTOCOL_DEFAULTS;
 use super::cells::AxisCells;
 use super::filtered::FilteredTable;
 use super::groups::Groups;
+use super::lines::MAX_POSITIONS;
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
 use crate::plot::{PlotError, colour, label};
 use crate::table::{self, HISTOGRAM_EDGES, Table};
-
-/// The horizontal axes, in the order of preference.
-const HORIZONTAL_AXES: [&str; 5] = ["t_f", "v_f", "v_i", "b", "a"];
 
 /// Shades of the outer and of the inner quantiles. Chosen: a light and a medium blue, as in maps of words.
 const OUTER: [u8; 3] = [0xd7, 0xe8, 0xf5];
@@ -34,9 +33,6 @@ const BANDS: [(&str, &str, [u8; 3], &str); 2] =
 /// The curves: column, name and series.
 const CURVES: [(&str, &str, usize); 3] =
     [("gap_q50", "median", 0), ("gap_min", "least", 2), ("gap_max", "greatest", 1)];
-
-/// Greatest number of positions along an axis; with more rows, several fall on one position. Chosen: more are invisible in print.
-const MAX_POSITIONS: usize = 1024;
 
 /// The columns of a reduced table, without the number of shortcuts.
 fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
@@ -100,11 +96,9 @@ fn edges() -> Vec<(f64, f64)> {
 
 /// Bands of the quantiles of the gap over an axis; for a single landscape, the fraction of its shortcuts over the gap.
 pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
-    let varies = |name: &&&str| filtered.axis(name).is_some_and(|axis| axis.values.len() > 2 || axis.many);
-    let across = HORIZONTAL_AXES
-        .iter()
-        .find(varies)
-        .or_else(|| HORIZONTAL_AXES.iter().find(|name| filtered.axis(name).is_some_and(|axis| axis.varies())));
+    let has =
+        |name: &str, least: usize| filtered.axis(name).is_some_and(|axis| axis.many || axis.values.len() >= least);
+    let across = [3, 2].into_iter().find_map(|least| PROTOCOL_DEFAULTS.x.iter().find(|name| has(name, least)));
     let columns: Vec<(&str, f64)> = QUANTILES.into_iter().filter(|(name, _)| filtered.has(name)).collect();
     match across {
         Some(across) => bands(filtered, across, &columns),
