@@ -116,8 +116,8 @@ impl Canvas {
         self.body.push('\n');
     }
 
-    fn stroke(stroke: &Stroke) -> String {
-        let mut text = format!("fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
+    fn style(fill: &str, stroke: &Stroke) -> String {
+        let mut text = format!("fill=\"{fill}\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
         if !stroke.dashes.is_empty() {
             let dashes: Vec<String> = stroke.dashes.iter().map(|&dash| at(dash)).collect();
             text.push_str(&format!(" stroke-dasharray=\"{}\"", dashes.join(" ")));
@@ -127,33 +127,31 @@ impl Canvas {
 
     /// A straight line.
     pub fn line(&mut self, from: (f64, f64), to: (f64, f64), stroke: &Stroke) {
-        let style = Self::stroke(stroke);
-        self.push(format_args!("<path d=\"M{} {}L{} {}\" {style}/>", at(from.0), at(from.1), at(to.0), at(to.1)));
+        self.push(format_args!("<path d=\"{}\" {}/>", path(&[from, to]), Self::style("none", stroke)));
     }
 
     /// Lines through points, one for each list.
     pub fn lines(&mut self, lines: &[Vec<(f64, f64)>], stroke: &Stroke) {
         let path: String = lines.iter().filter(|line| line.len() > 1).map(|line| path(line)).collect();
         if !path.is_empty() {
-            let style = Self::stroke(stroke);
+            let style = Self::style("none", stroke);
             self.push(format_args!("<path d=\"{path}\" stroke-linejoin=\"round\" {style}/>"));
         }
     }
 
     /// A closed shape.
     pub fn shape(&mut self, points: &[(f64, f64)], fill: &str, stroke: Option<&Stroke>) {
-        let path = path(points);
-        let line = stroke.map_or_else(String::new, |stroke| {
-            format!(" stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"", stroke.colour, at(stroke.width))
-        });
-        self.push(format_args!("<path d=\"{path}Z\" fill=\"{fill}\"{line}/>"));
+        let style = match stroke {
+            Some(stroke) => format!("{} stroke-linejoin=\"round\"", Self::style(fill, stroke)),
+            None => format!("fill=\"{fill}\""),
+        };
+        self.push(format_args!("<path d=\"{}Z\" {style}/>", path(points)));
     }
 
     /// A circle.
     pub fn circle(&mut self, (x, y): (f64, f64), radius: f64, fill: &str, stroke: &Stroke) {
         let place = format!("cx=\"{}\" cy=\"{}\" r=\"{}\"", at(x), at(y), at(radius));
-        let style = format!("fill=\"{fill}\" stroke=\"{}\" stroke-width=\"{}\"", stroke.colour, at(stroke.width));
-        self.push(format_args!("<circle {place} {style}/>"));
+        self.push(format_args!("<circle {place} {}/>", Self::style(fill, stroke)));
     }
 
     /// A filled rectangle.
@@ -163,7 +161,7 @@ impl Canvas {
 
     /// The frame of a rectangle.
     pub fn frame(&mut self, area: Area, stroke: &Stroke) {
-        self.push(format_args!("<rect {} {}/>", area.attributes(), Self::stroke(stroke)));
+        self.push(format_args!("<rect {} {}/>", area.attributes(), Self::style("none", stroke)));
     }
 
     /// A rectangle of grey diagonal lines: no data.
