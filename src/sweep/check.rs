@@ -129,8 +129,10 @@ impl Sweep {
             Ok(spec) => Sweep::check(&spec, text, folder),
             Err(faulty) => {
                 let (faults, spec) = *faulty;
-                // Without an axis or a scale, other faults may follow.
-                let is_needed = |fault: &SpecError| fault.key.contains("axes") || fault.key.starts_with("model");
+                // Without an axis, a scale or the name, other faults may follow.
+                let is_needed = |fault: &SpecError| {
+                    fault.key.contains("axes") || fault.key.starts_with("model") || &*fault.key == "name"
+                };
                 let spec = spec.filter(|_| !iter::once(&faults).chain(&faults.others).any(is_needed));
                 let others = spec.and_then(|spec| independent(&spec, folder).err());
                 Err(match others {
@@ -298,6 +300,10 @@ pub fn check_name(name: &str) -> Result<(), SpecError> {
         return Ok(());
     }
     let expected = format!("at most {MAX_NAME_BYTES} letters from a to z, digits, '-', '_' and '.', the first not '.'");
+    if name.is_empty() {
+        let help = "write it at the top, such as name = \"my_sweep\"; it names the folder of the dataset";
+        return refuse("name", "missing or empty", expected, help);
+    }
     refuse("name", format!("`{name}` cannot name a folder"), expected, "choose another name")
 }
 

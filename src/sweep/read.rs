@@ -14,7 +14,7 @@ impl Spec {
     ///
     /// # Errors
     ///
-    /// The syntax error, or unknown and missing keys and values of the wrong type.
+    /// The syntax error, or unknown keys and values of the wrong type.
     pub fn parse(text: &str) -> Result<Spec, SpecError> {
         Spec::recovered(text).map_err(|faulty| faulty.0)
     }
@@ -33,8 +33,6 @@ impl Spec {
             let error: toml::de::Error = match (toml::from_str(&rest), known) {
                 (Ok(spec), None) => return Ok(spec),
                 (Ok(spec), Some(faults)) => return Err(Box::new((faults, Some(spec)))),
-                // Its entry may be the blank one.
-                (Err(error), Some(faults)) if is_missing(&error) => return Err(Box::new((faults, None))),
                 (Err(error), faults) => {
                     known = faults;
                     error
@@ -42,8 +40,7 @@ impl Spec {
             };
             let span = error.span().unwrap_or_default();
             let key = key_at(&document, "", span.start).unwrap_or_default();
-            let entry = find(&document, &key).filter(|_| !is_missing(&error));
-            let entry = entry.map(|entry| entry.start..entry.value.span().end);
+            let entry = find(&document, &key).map(|entry| entry.start..entry.value.span().end);
             let fault = SpecError { line: Some(line_of(text, span.start)), ..fault(text, span, key, error.message()) };
             let faults = SpecError::and(known, fault);
             // Without the entry other faults show, at the same places.
@@ -53,11 +50,6 @@ impl Spec {
             known = Some(faults);
         }
     }
-}
-
-/// Whether an error is that of a missing key.
-fn is_missing(error: &toml::de::Error) -> bool {
-    error.message().starts_with("missing field ")
 }
 
 /// Replaces the characters of `entry` by blanks, except for ends of lines. Returns whether `text` is TOML then.
@@ -82,9 +74,6 @@ const SECTIONS: [(&str, &[&str]); 3] = [
     ("[tables.NAME]", &["columns", "reduce"]),
 ];
 
-/// The help for a missing key, which is the name.
-const HELP_FOR_MISSING: &str = "add it at the top, such as name = \"my_sweep\"; it names the folder of the dataset";
-
 /// The help for a key of the grid in the section of its axes.
 pub const HELP_FOR_GRID_KEY: &str = "write this key above the line [axes]; it is no axis";
 
@@ -96,9 +85,6 @@ pub fn is_grid_key(key: &str) -> bool {
 
 /// The fault that the parser reports with `message` for the value at `key`, written in `span` of `text`.
 fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecError {
-    if let Some(name) = message.strip_prefix("missing field ") {
-        return SpecError::new("", format!("{name} is missing"), format!("a key {name}"), HELP_FOR_MISSING);
-    }
     if message.starts_with("unknown field ") {
         let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let fault = unknown(key, "key", names[0], &names[1..]);

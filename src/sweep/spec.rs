@@ -14,7 +14,7 @@ use crate::model::Friction;
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(from = "Written")]
 pub struct Spec {
-    /// Name of the dataset and of its folder.
+    /// Name of the dataset and of its folder; empty if the spec has none.
     pub name: String,
     /// Description of the sweep.
     pub description: String,
@@ -34,6 +34,7 @@ pub struct Spec {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
+    #[serde(default)]
     name: String,
     #[serde(default)]
     description: String,
