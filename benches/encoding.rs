@@ -23,11 +23,9 @@ fn main() -> Outcome<()> {
     let zstd = |level| ZstdLevel::try_new(level).map(Compression::ZSTD);
     let ways = [
         ("plain", Some(Encoding::PLAIN), Compression::UNCOMPRESSED),
-        ("plain, LZ4", Some(Encoding::PLAIN), Compression::LZ4_RAW),
         ("plain, zstd 1", Some(Encoding::PLAIN), zstd(1)?),
         ("plain, zstd 3", Some(Encoding::PLAIN), zstd(3)?),
         ("byte stream split", Some(Encoding::BYTE_STREAM_SPLIT), Compression::UNCOMPRESSED),
-        ("byte stream split, LZ4", Some(Encoding::BYTE_STREAM_SPLIT), Compression::LZ4_RAW),
         ("byte stream split, zstd 1", Some(Encoding::BYTE_STREAM_SPLIT), zstd(1)?),
         ("byte stream split, zstd 3", Some(Encoding::BYTE_STREAM_SPLIT), zstd(3)?),
         ("dictionary, zstd 1", None, zstd(1)?),

@@ -1,6 +1,6 @@
 //! Locates the duration at which the protocol of least work ceases to speed up at once.
 //!
-//! `cargo run --example crossover`
+//! `cargo run --release --example crossover`
 
 use std::error::Error;
 

@@ -1,6 +1,6 @@
 //! Maps the landscape of cubic shortcuts, and finds the best point of the map at each duration.
 //!
-//! `cargo run --example landscape`
+//! `cargo run --release --example landscape`
 
 use std::error::Error;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Finds which materials fall into stick-slip when the velocity of the far end of the spring jumps.
 //!
-//! `cargo run --example stick_slip`
+//! `cargo run --release --example stick_slip`
 
 use slipsweep::model::{Law, StateLaw, Transition};
 use slipsweep::stability::SteadySliding;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Points of the stress sample, which is drawn over the whole legal domain, to 25 digits.
 
-    SLIPSWEEP_STRESS=400 SLIPSWEEP_STRESS_PRINT=1 cargo test --test solver stress:: -- --nocapture --test-threads 1 > points.txt
+    SLIPSWEEP_STRESS=400 SLIPSWEEP_STRESS_PRINT=1 cargo test --release --test solver stress:: -- --nocapture --test-threads 1 > points.txt
     venv/bin/python generate_stress.py points.txt
 
 The formulas are those of generate.py, at 80 digits: between velocities and times twenty decades apart half of them cancel. A point is left out

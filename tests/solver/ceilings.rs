@@ -145,7 +145,7 @@ const FINE: f64 = 1e-13;
 const ACCURACIES: [f64; 3] = [1e-6, 1e-10, FINE];
 
 /// Slopes are good to this at the tightest accuracy: the one by a ceiling is an integral of differences. The greatest error
-/// of `reference_slopes_under_ceilings` is 4.5e-13; `SLIPSWEEP_ERRORS=1 cargo test --test solver ceilings -- --nocapture`
+/// of `reference_slopes_under_ceilings` is 4.5e-13; `SLIPSWEEP_ERRORS=1 cargo test --release --test solver ceilings -- --nocapture`
 /// lists the fractions.
 const SLOPES_AT_BEST: f64 = 3e-13;
 

@@ -168,7 +168,7 @@ impl Extremal {
 }
 
 /// Intervals of an extremal, inside which friction has at most one maximum. Measured: with so many, all random optima of the physical domain can be
-/// traced (`cargo test random_optima`).
+/// traced (`cargo test --release random_optima`).
 pub(super) const INTERVALS: u32 = 32;
 
 impl Point {

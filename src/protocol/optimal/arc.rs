@@ -573,7 +573,7 @@ const NEAREST_HIGH: f64 = 1.6;
 /// most nodes.
 const CLOSEST: f64 = 0.01;
 
-/// Safety of the node estimate: `e^MARGIN` is the ratio of the error constant to the integral. Measured: the budgets of `optimal` (`cargo test --test
+/// Safety of the node estimate: `e^MARGIN` is the ratio of the error constant to the integral. Measured: the budgets of `optimal` (`cargo test --release --test
 /// solver budgets`).
 const MARGIN: f64 = 2.0;
 

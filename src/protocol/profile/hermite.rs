@@ -114,7 +114,7 @@ fn shifted(powers: &[f64; 6], d: f64) -> [f64; 6] {
 }
 
 impl Exponent for Hermite {
-    // Measured: with 0.45 control velocities between nodes were off by up to 3 rtol (`cargo test --test solver compliant`).
+    // Measured: with 0.45 control velocities between nodes were off by up to 3 rtol (`cargo test --release --test solver compliant`).
     const INTERPOLATION: f64 = 0.35;
 
     fn with(self, c: f64) -> Hermite {

@@ -115,7 +115,7 @@ fn every_column_keeps_its_budget_and_needs_it() {
     faults.extend(bare.map(|(table, column)| format!("{table}.{column} has no budget in any regime")));
     assert!(
         faults.is_empty(),
-        "{} faults; `SLIPSWEEP_BUDGETS=write cargo test --test solver budgets` states what is measured:\n{}",
+        "{} faults; `SLIPSWEEP_BUDGETS=write cargo test --release --test solver budgets` states what is measured:\n{}",
         faults.len(),
         faults.join("\n")
     );

@@ -24,7 +24,7 @@ pub fn check(ledger: &Ledger, points: &Points) {
     let right = filled(&text, ledger, points) == text;
     assert!(
         right,
-        "docs/accuracy-appendix.md shows other budgets: `SLIPSWEEP_BUDGETS=write cargo test --test solver budgets`"
+        "docs/accuracy-appendix.md shows other budgets: `SLIPSWEEP_BUDGETS=write cargo test --release --test solver budgets`"
     );
 }
 

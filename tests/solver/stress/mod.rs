@@ -34,7 +34,7 @@ use slipsweep::protocol::Status;
 /// Points of a table in continuous integration.
 const POINTS: u64 = 10_000;
 
-/// How many times fewer points a quick test has: `cargo test --test solver stress` then takes 14 s of processor time.
+/// How many times fewer points a quick test has: `cargo test --release --test solver stress` then takes 14 s of processor time.
 const QUICK: u64 = 25;
 
 /// Failures that a report names.
