@@ -317,6 +317,8 @@ pub(super) fn unreadable(dataset: &Path, error: &AnswerError) -> Failure {
     let path = dataset.display();
     let help = if Folder::at(dataset).manifest_path().exists() {
         format!("`slipsweep status {path} --check` names damaged files, and the next run recomputes them")
+    } else if error.to_string().contains("Disabled feature") {
+        "write the file with Snappy or zstd, or without compression".to_owned()
     } else {
         "write the file again".to_owned()
     };
