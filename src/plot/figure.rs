@@ -76,21 +76,12 @@ pub struct Figure {
     pub aspect: f64,
     /// The legend.
     pub legend: Vec<Entry>,
-    /// The colours of maps.
-    pub colours: Option<Colours>,
+    /// The numbers that the colours of maps stand for; the darkest colour is at the start of their scale.
+    pub colours: Option<Axis>,
     /// Notes below the panels, in markup.
     pub notes: Vec<String>,
     /// Notes for the terminal, such as omitted panels.
     pub remarks: Vec<String>,
-}
-
-/// Colours for numbers.
-#[derive(Debug, Clone)]
-pub struct Colours {
-    /// The name of the numbers, in markup.
-    pub label: String,
-    /// Their scale; the darkest colour is at its start.
-    pub scale: Scale,
 }
 
 /// A panel: a pair of axes and the layers between them.
@@ -287,7 +278,7 @@ impl Figure {
         if !self.legend.is_empty() {
             top = self.draw_legend(&mut canvas, top, inner);
         }
-        let bar = self.colours.as_ref().map_or(0.0, |colours| colours.width());
+        let bar = self.colours.as_ref().map_or(0.0, Axis::bar_width);
         let (mut foot, maps) = self.draw_panels(&mut canvas, top, inner - bar - self.row_title_width());
         for note in &self.notes {
             foot = paragraph(&mut canvas, note, &NOTE, foot, (inner, 2.0));
@@ -392,7 +383,7 @@ impl Figure {
             let first = top + layout.aboves.first().copied().unwrap_or(0.0);
             let tall = y - layout.belows.last().copied().unwrap_or(0.0) - first;
             let x = MARGIN + inner + self.row_title_width() + BAR_SPACE;
-            colours.draw(canvas, Area { x, y: first, width: BAR_WIDTH, height: tall });
+            colours.draw_bar(canvas, Area { x, y: first, width: BAR_WIDTH, height: tall });
         }
         (y, maps)
     }
@@ -727,13 +718,14 @@ fn draw_clear_star(canvas: &mut Canvas, area: Area, (x, y): (f64, f64)) {
     symbol::draw_star(canvas, place);
 }
 
-impl Colours {
-    fn width(&self) -> f64 {
+impl Axis {
+    /// Width of its colour bar with the space before it.
+    fn bar_width(&self) -> f64 {
         let ticks = self.scale.ticks(6);
         BAR_SPACE + BAR_WIDTH + TICK_LENGTH + 2.0 + widest(&ticks) + 4.0 + SIZE + 1.0
     }
 
-    fn draw(&self, canvas: &mut Canvas, area: Area) {
+    fn draw_bar(&self, canvas: &mut Canvas, area: Area) {
         let colour = |i| Some(viridis(1.0 - (i as f64 + 0.5) / BAR_STEPS as f64));
         if let Some(png) = super::export::image(1, &(0..BAR_STEPS).map(colour).collect::<Vec<_>>()) {
             canvas.image(area, &png);
@@ -741,13 +733,9 @@ impl Colours {
         canvas.frame(area, &Stroke::solid("#000", FRAME_WIDTH));
         let ticks = self.scale.ticks(6);
         ticks.draw_side_axis(canvas, area, true, true);
-        let mut words = self.label.clone();
-        if ticks.power != 0 {
-            words.push_str(&format!(" (10^{{{}}})", label::signed(ticks.power)));
-        }
         let x = area.x + area.width + TICK_LENGTH + 2.0 + widest(&ticks) + 4.0 + SIZE - 1.0;
         let style = Text { anchor: Anchor::Middle, upwards: true, ..LABEL };
-        canvas.text((x, area.y + 0.5 * area.height), &words, &style);
+        canvas.text((x, area.y + 0.5 * area.height), &self.label(ticks.power), &style);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
 use crate::plot::contour::contour;
 use crate::plot::export::image;
-use crate::plot::figure::{Axis, Colours, Entry, Figure, Hover, Key, Layer, Panel};
+use crate::plot::figure::{Axis, Entry, Figure, Hover, Key, Layer, Panel};
 use crate::plot::scale::{Scale, range};
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, label};
@@ -84,7 +84,7 @@ struct Raster {
 struct Shading<'a> {
     column: &'a str,
     words: Vec<String>,
-    colours: Option<Colours>,
+    colours: Option<Axis>,
     /// The size below which a gap is rounding.
     least_gap: f64,
 }
@@ -256,12 +256,7 @@ impl Shading<'_> {
             _ if all.high > all.low => all,
             _ => all.with_room(0.05),
         };
-        Ok(Shading {
-            column,
-            words,
-            colours: Some(Colours { label: label::axis(column, &filtered.unit(column), 0), scale }),
-            least_gap,
-        })
+        Ok(Shading { column, words, colours: Some(Axis::new(column, &filtered.unit(column), scale)), least_gap })
     }
 
     /// Whether the column is a flag of stability: it has the colours of outcomes, and words.
@@ -288,8 +283,8 @@ impl Shading<'_> {
     fn colour(&self, value: f64) -> Option<[u8; 3]> {
         (!value.is_nan()).then(|| match &self.colours {
             _ if self.is_below(value) => BELOW_ZERO,
-            Some(Colours { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
-            Some(Colours { scale, .. }) => viridis(scale.fraction(value)),
+            Some(Axis { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
+            Some(Axis { scale, .. }) => viridis(scale.fraction(value)),
             None => class(self.shade(value)),
         })
     }

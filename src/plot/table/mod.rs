@@ -349,14 +349,8 @@ impl TableScene<'_> {
         }
         // The work of this table is the least work.
         if self.filtered.table == "optimal" {
-            let least = "work_optimal";
-            let axes = figure.panels.iter_mut().map(|panel| &mut panel.y).filter(|axis| axis.column == "work");
-            axes.for_each(|axis| axis.column = least.to_owned());
-            if let (Shape::Map(map::MapColumns { value, .. }), Some(colours)) = (shape, &mut figure.colours)
-                && value == "work"
-            {
-                colours.label = label::axis(least, &self.filtered.unit("work"), 0);
-            }
+            let axes = figure.panels.iter_mut().map(|panel| &mut panel.y).chain(&mut figure.colours);
+            axes.filter(|axis| axis.column == "work").for_each(|axis| axis.column = "work_optimal".to_owned());
         }
         Ok(figure)
     }
