@@ -1,7 +1,6 @@
 //! The groups of a table: combinations of the axes that are not drawn in a panel. Each group makes a panel or a line.
 
 use std::cmp::Ordering;
-use std::collections::HashMap;
 
 use super::filtered::{FilteredTable, Values, bits};
 use indexmap::{IndexMap, IndexSet};
@@ -157,7 +156,6 @@ pub struct Groups {
     pub crossed: Option<[Vec<String>; 2]>,
     /// The values of further axes that are common to all shown groups, in markup.
     pub held: Vec<String>,
-    places: HashMap<Vec<u64>, usize>,
 }
 
 /// The role of a group in a figure.
@@ -233,9 +231,7 @@ impl Groups {
             makes,
             crossed: None,
             held: shown.first().map_or_else(Vec::new, |first| words(first, &same, !has_names)),
-            places: HashMap::new(),
         };
-        groups.places = places_of(&groups.shown);
         if makes == GroupRole::Panels && !has_names {
             let values = values_of(&found);
             let free: Vec<usize> = varying(&values).into_iter().filter(|axis| !is_of_point(axis)).collect();
@@ -288,7 +284,6 @@ impl Groups {
         self.shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
         let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.text_of(value)).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
-        self.places = places_of(&self.shown);
         self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
         true
     }
@@ -297,7 +292,8 @@ impl Groups {
     pub fn place(&self, values: &[f64]) -> Option<usize> {
         let mut values = values.to_vec();
         self.makes.merge(&self.axes, &mut values);
-        self.places.get(&bits(&values)).copied()
+        let is_same = |(own, value): (&f64, &f64)| own == value || own.is_nan() && value.is_nan();
+        self.shown.iter().position(|group| group.values.iter().zip(&values).all(is_same))
     }
 
     /// A figure without panels, to which each group adds one; `aspect` applies to a single panel.
@@ -488,10 +484,6 @@ fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usiz
     }
     places.sort_unstable();
     places
-}
-
-fn places_of(groups: &[Group]) -> HashMap<Vec<u64>, usize> {
-    groups.iter().enumerate().map(|(place, group)| (bits(&group.values), place)).collect()
 }
 
 /// `most` of `all` indices, evenly spread, including the first and the last.
