@@ -8,7 +8,7 @@ use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Entry, Key, Layer};
 use crate::plot::{colour, label};
-use crate::protocol::optimal::crossover::{self, CrossoverTimes, Wanted};
+use crate::protocol::optimal::crossover::{self, Wanted};
 use crate::protocol::optimal::{self, Bounds};
 use crate::stability::SteadySliding;
 
@@ -30,8 +30,6 @@ struct Overlay {
     is_zero_of: &'static str,
     /// Steps along a curve. Chosen: no corner is visible in print.
     steps: usize,
-    /// The values of the curves at a point, in scaled units.
-    of: fn(&MapPoint<'_>) -> Vec<Option<f64>>,
 }
 
 /// A curve: its column, words after the name of the column, width and dashes.
@@ -47,6 +45,9 @@ struct MapPoint<'a> {
 
 const DASHES: &[f64] = &[3.0, 1.6];
 
+/// Durations at which the optimal strategy changes.
+const TIMES: [&str; 5] = ["t_cheapest", "t_cross", "t_floor", "t_min", "t_turn"];
+
 const OVERLAYS: [Overlay; 5] = [
     Overlay {
         tables: &["stability", "step_response"],
@@ -56,7 +57,6 @@ const OVERLAYS: [Overlay; 5] = [
         curves: &[Curve("k_c_f", "", 1.0, &[4.0, 2.0])],
         is_zero_of: "growth_rate",
         steps: 400,
-        of: |point| vec![point.critical_stiffness()],
     },
     Overlay {
         tables: &["optimal"],
@@ -66,10 +66,6 @@ const OVERLAYS: [Overlay; 5] = [
         curves: &[Curve("t_cross", "", 0.9, &[]), Curve("t_floor", "", 0.9, DASHES)],
         is_zero_of: "",
         steps: 120,
-        of: |point| {
-            let times = point.times(Wanted { cross: true, floor: true, ..NO_TIME });
-            times.map_or(Vec::new(), |times| vec![times.t_cross, times.t_floor])
-        },
     },
     Overlay {
         tables: &["optimal"],
@@ -79,7 +75,6 @@ const OVERLAYS: [Overlay; 5] = [
         curves: &[Curve("v_ceiling_least", "", 0.9, DASHES), Curve("v_max", " without ceiling", 0.9, &[])],
         is_zero_of: "",
         steps: 120,
-        of: |point| point.ceilings("v_ceiling"),
     },
     Overlay {
         tables: &["optimal"],
@@ -89,7 +84,6 @@ const OVERLAYS: [Overlay; 5] = [
         curves: &[Curve("tau_ceiling_least", "", 0.9, DASHES), Curve("friction_max", " without ceiling", 0.9, &[])],
         is_zero_of: "",
         steps: 120,
-        of: |point| point.ceilings("tau_ceiling"),
     },
     // From steady sliding at `v = 1/theta`: where the velocity is `1/theta` now, where it reaches the floor, and the least time.
     Overlay {
@@ -104,15 +98,8 @@ const OVERLAYS: [Overlay; 5] = [
         ],
         is_zero_of: "",
         steps: 240,
-        of: |point| {
-            let times = point.times(Wanted { cross: true, floor: true, min: true, ..NO_TIME });
-            times.map_or(Vec::new(), |times| vec![times.t_cross, times.t_floor, times.t_min])
-        },
     },
 ];
-
-/// No duration.
-const NO_TIME: Wanted = Wanted { cross: false, floor: false, cheapest: false, min: false, turn: false, free: false };
 
 /// Draws the curves that belong on a map, and the lines on which its column is 0 if none of the curves is such a line. A curve that leaves a panel
 /// everywhere is not drawn there.
@@ -154,10 +141,9 @@ impl Overlay {
                 let at = map.cells[along].scale.value(step as f64 / self.steps as f64);
                 let value =
                     |name: &str| if name == axis { Some(at / unit) } else { scene.scaled(&map.groups, group, name) };
-                let found = (self.of)(&MapPoint { value: &value, bounded: scene.source.bounded });
-                for (curve, points) in points.iter_mut().enumerate() {
-                    let found = found.get(curve).copied().flatten();
-                    points.push((at, found.map_or(f64::NAN, |found| found * unit_of_other)));
+                let point = MapPoint { value: &value, bounded: scene.source.bounded };
+                for (curve, points) in self.curves.iter().zip(&mut points) {
+                    points.push((at, point.find(curve.0).map_or(f64::NAN, |found| found * unit_of_other)));
                 }
             }
             let scale = if along == 0 { panel.y.scale } else { panel.x.scale };
@@ -199,33 +185,41 @@ impl MapPoint<'_> {
         Some(Transition { law: self.law()?, v_i, v_f: (self.value)("v_f")? })
     }
 
-    fn critical_stiffness(&self) -> Option<f64> {
-        let sliding = SteadySliding::new(self.law()?, 1.0, (self.value)("m")?, (self.value)("v_f")?);
-        Some(sliding.critical_stiffness())
-    }
-
-    /// The durations at which the strategy changes without ceilings.
-    fn times(&self, wanted: Wanted) -> Option<CrossoverTimes> {
+    /// The value of a curve or mark, in scaled units.
+    fn find(&self, name: &str) -> Option<f64> {
+        if name == "k_c_f" {
+            let sliding = SteadySliding::new(self.law()?, 1.0, (self.value)("m")?, (self.value)("v_f")?);
+            return Some(sliding.critical_stiffness());
+        }
         let transition = self.transition()?;
-        let Transition { law: Law { a, b }, v_i, v_f } = transition;
-        let is_legal = a > 0.0 && b >= 0.0 && v_i > 1.0 && v_f > 1.0 && v_i != v_f;
-        is_legal.then(|| crossover::solve(&transition, self.bounded, RTOL, wanted).1)
+        if name.starts_with("t_") { self.time(&transition, name) } else { self.ceiling(&transition, name) }
     }
 
-    /// The least feasible value of the ceiling `axis`, and the greatest value of the optimum without it.
-    fn ceilings(&self, axis: &str) -> Vec<Option<f64>> {
-        let (Some(transition), Some(t_f)) = (self.transition(), (self.value)("t_f")) else { return Vec::new() };
+    /// A duration at which the strategy changes without ceilings.
+    fn time(&self, transition: &Transition, name: &str) -> Option<f64> {
+        let [cheapest, cross, floor, min, turn] = TIMES.map(|time| time == name);
+        let wanted = Wanted { cross, floor, cheapest, min, turn, free: false };
+        let times = crossover::solve(transition, self.bounded, RTOL, wanted).1;
+        let wanted = times.t_cheapest.or(times.t_cross).or(times.t_floor).or(times.t_min).or(times.t_turn);
+        wanted.filter(|_| transition.v_i != transition.v_f)
+    }
+
+    /// The least feasible value of a ceiling, or the greatest value of the optimum without this ceiling.
+    fn ceiling(&self, transition: &Transition, name: &str) -> Option<f64> {
+        let t_f = (self.value)("t_f")?;
+        let is_of_v = name.starts_with('v');
         // A ceiling without a finite value is none.
-        let [v_ceiling, tau_ceiling] =
-            CEILINGS.map(|name| (self.value)(name).filter(|_| name != axis).unwrap_or(f64::INFINITY));
+        let other = |ceiling: &str, is_own: bool| (self.value)(ceiling).filter(|_| !is_own).unwrap_or(f64::INFINITY);
+        let [v_ceiling, tau_ceiling] = [other(CEILINGS[0], is_of_v), other(CEILINGS[1], !is_of_v)];
         let bounds = Bounds { floor: self.bounded, v_ceiling, tau_ceiling };
-        let free = optimal::solve(&transition, t_f, bounds, RTOL).value;
-        if axis == CEILINGS[0] {
-            // The velocity has its greatest value at an end, or just below on a friction ceiling.
-            let greatest = free.map(|free| free.v_start.max(free.v_end));
-            vec![optimal::least_v_ceiling(&transition, t_f, bounds, RTOL), greatest]
-        } else {
-            vec![optimal::least_tau_ceiling(&transition, t_f, bounds, RTOL), free.map(|free| free.friction_max)]
+        match name {
+            "v_ceiling_least" => optimal::least_v_ceiling(transition, t_f, bounds, RTOL),
+            "tau_ceiling_least" => optimal::least_tau_ceiling(transition, t_f, bounds, RTOL),
+            _ => {
+                let free = optimal::solve(transition, t_f, bounds, RTOL).value?;
+                // The velocity has its greatest value at an end, or just below on a friction ceiling.
+                Some(if is_of_v { free.v_start.max(free.v_end) } else { free.friction_max })
+            }
         }
     }
 }
@@ -259,23 +253,12 @@ fn marks_of(scene: &TableScene<'_>, groups: &Groups, group: usize, axis: &str) -
     }
     let value = |name: &str| scene.scaled(groups, group, name);
     let point = MapPoint { value: &value, bounded: scene.source.bounded };
-    if CEILINGS.contains(&axis) {
-        let names: [&str; 2] =
-            if axis == CEILINGS[0] { ["v_ceiling_least", "v_max"] } else { ["tau_ceiling_least", "friction_max"] };
-        return names.into_iter().zip(point.ceilings(axis)).collect();
-    }
     let is_capped = CEILINGS.iter().any(|name| scene.value(groups, group, name).is_some_and(f64::is_finite));
-    if axis != "t_f" || is_capped {
-        return Vec::new();
-    }
-    let all = Wanted { cross: true, floor: true, cheapest: true, min: true, turn: true, free: false };
-    point.times(all).map_or(Vec::new(), |times| {
-        vec![
-            ("t_cheapest", times.t_cheapest),
-            ("t_cross", times.t_cross),
-            ("t_floor", times.t_floor),
-            ("t_min", times.t_min),
-            ("t_turn", times.t_turn),
-        ]
-    })
+    let names: &[&str] = match axis {
+        "v_ceiling" => &["v_ceiling_least", "v_max"],
+        "tau_ceiling" => &["tau_ceiling_least", "friction_max"],
+        "t_f" if !is_capped => &TIMES,
+        _ => &[],
+    };
+    names.iter().map(|&name| (name, point.find(name))).collect()
 }
