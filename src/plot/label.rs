@@ -210,21 +210,17 @@ pub fn few(texts: &[impl AsRef<str>]) -> String {
 
 /// The label of an axis: name, unit and the common power of ten of its numbers.
 pub fn axis(column: &str, of: &str, power: i32) -> String {
+    let name = if column == "gap" { "gap (*W* − *W*∗)/*W*∗".to_owned() } else { name(column) };
+    // A coefficient per duration is shown times the duration.
+    let (name, of) = match of.find("/t_f") {
+        Some(place) => (format!("{name} {}", unit(&of[place + 1..])), of[..place].trim_matches(['(', ')'])),
+        None => (name, of),
+    };
     let scale = if power == 0 { String::new() } else { format!("10^{{{}}}", signed(power)) };
-    let inside = match (scale.is_empty(), unit(of)) {
-        (true, unit) => unit,
-        (false, unit) if unit.is_empty() => scale,
-        (false, unit) => format!("{scale} {unit}"),
-    };
-    let name = match (column, of) {
-        ("alpha_2", "1/t_f") => return "*α*_{2} *t*_{f}".to_owned(),
-        ("alpha_3", "1/t_f^2") => return "*α*_{3} *t*_{f}^{2}".to_owned(),
-        ("alpha_2", "(l/v_0)/t_f") => return "*α*_{2} *t*_{f} (*l*/*v*_{0})".to_owned(),
-        ("alpha_3", "(l/v_0)/t_f^2") => return "*α*_{3} *t*_{f}^{2} (*l*/*v*_{0})".to_owned(),
-        ("gap", _) => "gap (*W* − *W*∗)/*W*∗".to_owned(),
-        _ => name(column),
-    };
-    if inside.is_empty() { name } else { format!("{name} ({inside})") }
+    match format!("{scale} {}", unit(of)).trim() {
+        "" => name,
+        inside => format!("{name} ({inside})"),
+    }
 }
 
 /// An integer with a true minus sign.
@@ -327,6 +323,7 @@ mod tests {
         assert_eq!(axis("m", "mu_0 sigma l/v_0^2", 0), "*m* (*μ*_{0} *σ* *l*/*v*_{0}^{2})");
         assert_eq!(axis("alpha_2", "1/t_f", 0), "*α*_{2} *t*_{f}");
         assert_eq!(axis("alpha_2", "(l/v_0)/t_f", 0), "*α*_{2} *t*_{f} (*l*/*v*_{0})");
+        assert_eq!(axis("alpha_3", "1/t_f^2", -4), "*α*_{3} *t*_{f}^{2} (10^{−4})");
         assert_eq!(axis("terminal_error", "1", 0), "terminal error");
         assert_eq!(axis("k", "Pa/m", 3), "*k* (10^{3} Pa/m)");
         assert_eq!(axis("m", "kg/m^2", 0), "*m* (kg/m^{2})");
