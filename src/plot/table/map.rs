@@ -293,21 +293,18 @@ impl Shading<'_> {
     fn legend(&self, sheets: &[PanelCells], are_dots: bool) -> Vec<Entry> {
         let has =
             |wanted: &dyn Fn(f64) -> bool| sheets.iter().any(|sheet| sheet.value.iter().any(|value| wanted(*value)));
+        let key = |colour: Option<[u8; 3]>, shape: usize| match colour {
+            _ if are_dots => Key::Mark(Symbol::of_row(colour, shape)),
+            Some(colour) => Key::Fill(colour),
+            None => Key::Hatch,
+        };
         let words = self.words.iter().enumerate().map(|(place, word)| (place as f64, word));
         let words = words.filter(|(place, _)| has(&|value| value == *place)).map(|(place, word)| {
             let shade = self.shade(place);
-            let key =
-                if are_dots { Key::Mark(Symbol::of_row(Some(class(shade)), shade)) } else { Key::Fill(class(shade)) };
-            Entry { key, text: self.meaning(word) }
+            Entry { key: key(Some(class(shade)), shade), text: self.meaning(word) }
         });
-        let hole = || Entry {
-            key: if are_dots { Key::Mark(Symbol::of_row(None, 0)) } else { Key::Hatch },
-            text: nothing(sheets),
-        };
-        let below = || Entry {
-            key: if are_dots { Key::Mark(Symbol::of_row(Some(BELOW_ZERO), 0)) } else { Key::Fill(BELOW_ZERO) },
-            text: "gap below 0".to_owned(),
-        };
+        let hole = || Entry { key: key(None, 0), text: nothing(sheets) };
+        let below = || Entry { key: key(Some(BELOW_ZERO), 0), text: "gap below 0".to_owned() };
         words.chain(has(&|value| self.is_below(value)).then(below)).chain(has(&f64::is_nan).then(hole)).collect()
     }
 
