@@ -3,7 +3,7 @@
 use super::label;
 
 /// Ratio of the greatest to the least value from which the scale is logarithmic. Chosen: a decade and a half.
-pub const LOG_RATIO: f64 = 30.0;
+const LOG_RATIO: f64 = 30.0;
 
 /// Ratio of the positive values from which the scale is logarithmic although other values are zero and are not drawn. Chosen: many decades
 /// matter more.
@@ -11,6 +11,9 @@ const LOG_RATIO_WITH_ZERO: f64 = 1e9;
 
 /// Size, relative to the greatest value, below which values may be rounded zeros. Chosen: nine thousand roundings of 1.1e-16, a hundredth of the default `rtol`.
 const ROUNDING_RTOL: f64 = 1e-12;
+
+/// Range of values, relative to the greatest, below which they are constant. Chosen: the range is rounding.
+pub const CONSTANT_RTOL: f64 = 1e-9;
 
 /// Number of empty decades between such zeros and other values. Chosen: neighbouring points of a curve are closer.
 const EMPTY_DECADES: usize = 6;
@@ -69,8 +72,7 @@ impl Scale {
             return Scale { low: self.low * (-room).exp(), high: self.high * room.exp(), log: true };
         }
         let span = self.high - self.low;
-        // Below this the range is rounding.
-        let least = 1e-9 * self.low.abs().max(self.high.abs());
+        let least = CONSTANT_RTOL * self.low.abs().max(self.high.abs());
         let room = if span > least {
             span * fraction
         } else if least > 0.0 {

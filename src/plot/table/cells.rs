@@ -1,7 +1,7 @@
 //! The cells of an axis in a map: one for each value if these are few, else one for several consecutive values.
 
 use super::filtered::Values;
-use crate::plot::scale::{LOG_RATIO, Scale, is_logarithmic};
+use crate::plot::scale::{Scale, is_logarithmic};
 
 /// The cells of an axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,8 +23,7 @@ impl AxisCells {
     pub fn new(axis: &Values, most: usize) -> AxisCells {
         let values = &axis.values;
         let (low, high) = (values[0], values[values.len() - 1]);
-        let log = if axis.many { low > 0.0 && high / low > LOG_RATIO } else { is_logarithmic(values) };
-        let span = Scale { low, high, log };
+        let span = Scale { low, high, log: is_logarithmic(values) };
         if axis.many {
             let middles = (0..most).map(|cell| span.value((cell as f64 + 0.5) / most as f64)).collect();
             return AxisCells { middles, scale: span, even: true, exact: false, firsts: Vec::new() };
@@ -48,7 +47,7 @@ impl AxisCells {
             let middle = |cell: usize| at((cell * together) as f64 + 0.5 * (together - 1) as f64);
             let middles = if exact { values.clone() } else { (0..firsts.len()).map(middle).collect() };
             // Half a step beyond the first value and the last cell, which may have fewer values.
-            let scale = Scale { low: at(-0.5), high: at((firsts.len() * together) as f64 - 0.5), log };
+            let scale = Scale { low: at(-0.5), high: at((firsts.len() * together) as f64 - 0.5), ..span };
             return AxisCells { middles, scale, even, exact, firsts };
         }
         let middles: Vec<f64> = values.chunks(together).map(|chunk| chunk[chunk.len() / 2]).collect();
@@ -56,7 +55,7 @@ impl AxisCells {
         // Half a cell beyond the first and the last centre.
         let beyond = |edge: usize, inner: usize| span.value(1.5 * fractions[edge] - 0.5 * fractions[inner]);
         let end = fractions.len() - 1;
-        let scale = Scale { low: beyond(0, 1), high: beyond(end, end - 1), log };
+        let scale = Scale { low: beyond(0, 1), high: beyond(end, end - 1), ..span };
         AxisCells { middles, scale, even, exact, firsts }
     }
 

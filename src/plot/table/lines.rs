@@ -7,15 +7,12 @@ use indexmap::IndexSet;
 
 use crate::plot::colour;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
-use crate::plot::scale::{Scale, range};
+use crate::plot::scale::{CONSTANT_RTOL, Scale, range};
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, coincide, label};
 
 /// Greatest number of positions along a line; with more rows, several fall on one position. Chosen: more are invisible in print.
 pub const MAX_POSITIONS: usize = 4096;
-
-/// Range of a column, relative to its greatest value, below which it is constant. Chosen: the range is rounding.
-pub const CONSTANT_RTOL: f64 = 1e-9;
 
 /// Ratio of height to width of a single panel, and of several above each other. Chosen: curves rise by about 45 degrees, and all panels fit on a
 /// page.

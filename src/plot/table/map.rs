@@ -3,13 +3,12 @@
 use super::cells::AxisCells;
 use super::filtered::{FilteredTable, Values};
 use super::groups::Groups;
-use super::lines::CONSTANT_RTOL;
 use crate::plot::canvas::Stroke;
 use crate::plot::colour::{class, viridis};
 use crate::plot::contour::contour;
 use crate::plot::export::image;
 use crate::plot::figure::{Axis, Entry, Figure, Hover, Key, Layer, Panel};
-use crate::plot::scale::{Scale, range};
+use crate::plot::scale::{CONSTANT_RTOL, Scale, range};
 use crate::plot::symbol::Symbol;
 use crate::plot::{PlotError, label};
 use crate::protocol::Status;
