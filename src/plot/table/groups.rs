@@ -156,6 +156,8 @@ pub struct Groups {
     pub crossed: Option<[Vec<String>; 2]>,
     /// The values of further axes that are common to all shown groups, in markup.
     pub held: Vec<String>,
+    /// A note on axes that change only with the drawn ones.
+    pub along: Option<String>,
 }
 
 /// The role of a group in a figure.
@@ -170,14 +172,10 @@ pub enum GroupRole {
 }
 
 impl Groups {
-    /// The groups of the rows of `filtered` as panels of `columns` over the `drawn` axes, and a note on axes that change only with others.
-    pub fn of_panels(
-        filtered: &FilteredTable,
-        drawn: &[&str],
-        columns: &[&str],
-    ) -> Result<(Groups, Option<String>), PlotError> {
+    /// The groups of the rows of `filtered` as panels of `columns` over the `drawn` axes.
+    pub fn of_panels(filtered: &FilteredTable, drawn: &[&str], columns: &[&str]) -> Result<Groups, PlotError> {
         let (further, along) = further(filtered, drawn, GroupRole::Panels)?;
-        Ok((Groups::new(filtered, &further, GroupRole::Panels, None, [drawn, columns])?, along))
+        Ok(Groups { along, ..Groups::new(filtered, &further, GroupRole::Panels, None, [drawn, columns])? })
     }
 
     /// The groups of the rows of `filtered` over `axes`, without those that have no value in the columns over the axes `drawn`. If a figure cannot
@@ -231,6 +229,7 @@ impl Groups {
             makes,
             crossed: None,
             held: shown.first().map_or_else(Vec::new, |first| words(first, &same, !has_names)),
+            along: None,
         };
         if makes == GroupRole::Panels && !has_names {
             let values = values_of(&found);
@@ -340,11 +339,11 @@ impl Groups {
         })
     }
 
-    /// Notes about omitted groups, in markup.
+    /// Notes about omitted groups and axes, in markup.
     fn notes(&self) -> Vec<String> {
         let omitted = self.omitted(label::name).map(|omitted| format!("{omitted} are shown."));
         let empty = (!self.empty.is_empty()).then(|| format!("No value for {}.", label::few(&self.empty)));
-        omitted.into_iter().chain(empty).collect()
+        omitted.into_iter().chain(empty).chain(self.along.clone()).collect()
     }
 }
 

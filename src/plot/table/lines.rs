@@ -54,8 +54,6 @@ struct Rows {
     lines: Vec<Line>,
     /// Whether rows are scattered points, such as materials, without lines between them.
     are_scattered: bool,
-    /// A note on axes that change only with others.
-    along: Option<String>,
 }
 
 /// The rows of a group: a position for each cell of the axis or, if rows are scattered, for each row.
@@ -83,7 +81,7 @@ struct Graph {
 ///
 /// No row with a value, or a part that cannot be read.
 pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure, PlotError> {
-    let mut rows = Rows::read(filtered, plan)?;
+    let rows = Rows::read(filtered, plan)?;
     let x = rows.cells.ends().with_room(MARK_ROOM[0]);
     let graphs = (0..plan.y.len()).filter_map(|panel| rows.graph(filtered, plan, panel, x));
     // A constant column is stated instead of drawn, unless all columns are constant.
@@ -99,7 +97,6 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     if drawn.iter().any(|graph| graph.is_cut) {
         notes.push("Zeros, and rounding errors in their place, are below the logarithmic axes.".to_owned());
     }
-    notes.extend(rows.along.take());
     if rows.has_ranges() {
         let (count, name) = (rows.cells.len(), label::name(&plan.x));
         notes.push(match rows.cells.exact {
@@ -147,7 +144,8 @@ impl Rows {
         further.sort_by_key(|name| Some(*name) != series);
         let first = further.first().copied().filter(|name| Some(*name) == series);
         let drawn: Vec<&str> = plan.y.iter().map(String::as_str).collect();
-        let groups = Groups::new(filtered, &further, makes, first, [&[&plan.x], &drawn])?;
+        let mut groups = Groups::new(filtered, &further, makes, first, [&[&plan.x], &drawn])?;
+        groups.along = along;
         let labels = if are_scattered { filtered.names_of_dots(of_symbols)? } else { Vec::new() };
         let cells = AxisCells::new(axis, MAX_POSITIONS);
         let has_row_each = are_scattered && filtered.rows <= MAX_POSITIONS as u64;
@@ -173,7 +171,7 @@ impl Rows {
                 ranges[place] = (low.min(value), high.max(value));
             }
         })?;
-        Ok(Rows { groups, cells, lines, are_scattered, along })
+        Ok(Rows { groups, cells, lines, are_scattered })
     }
 
     /// The finite values of a panel.

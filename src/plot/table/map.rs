@@ -94,7 +94,7 @@ struct Shading<'a> {
 ///
 /// No row with a value, or a part that cannot be read.
 pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, PlotError> {
-    let (groups, along) = Groups::of_panels(filtered, &[&plan.x, &plan.y], &[&plan.value])?;
+    let groups = Groups::of_panels(filtered, &[&plan.x, &plan.y], &[&plan.value])?;
     let raster = Raster::new(filtered, plan, &groups)?;
     let sheets = raster.read(filtered, plan, &groups)?;
     let shading = Shading::new(filtered, &plan.value, &sheets)?;
@@ -119,7 +119,7 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
     let unbounded = |name: &&String| filtered.axis(name).is_some_and(|axis| axis.infinite);
     let unbounded = [&plan.x, &plan.y].into_iter().find(unbounded);
     let unbounded = unbounded.map(|name| format!("Rows with {} = ∞ have no place in the map.", label::name(name)));
-    figure.notes.extend(along.into_iter().chain(unbounded).chain(raster.note(plan)).chain(rounding));
+    figure.notes.extend(unbounded.into_iter().chain(raster.note(plan)).chain(rounding));
     let least = sheets.iter().map(|sheet| sheet.least.map(|(x, y, _)| (x, y))).collect();
     let is_signed = figure.colours.is_some() && plan.value != "gap" && !raster.are_dots;
     let values = sheets.into_iter().filter(|_| is_signed).map(|sheet| sheet.value).collect();

@@ -43,7 +43,7 @@ fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
 /// Histogram: numbers of shortcuts by decade of the gap.
 pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(filtered);
-    let (groups, along) = Groups::of_panels(filtered, &[], &[])?;
+    let groups = Groups::of_panels(filtered, &[], &[])?;
     let wanted: Vec<&str> = columns.iter().copied().chain(groups.axes.iter().map(String::as_str)).collect();
     let mut counts = vec![vec![0.0; columns.len()]; groups.shown.len()];
     filtered.each(&wanted, |row| {
@@ -83,7 +83,6 @@ pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), Plot
     if last + 1 == edges.len() {
         figure.notes.push(format!("The last bar holds all gaps from {greatest} on."));
     }
-    figure.notes.extend(along);
     Ok((figure, Vec::new()))
 }
 
@@ -114,7 +113,7 @@ struct Quantiles<'a> {
 }
 
 fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
-    let (groups, along) = Groups::of_panels(filtered, &[across], &[])?;
+    let groups = Groups::of_panels(filtered, &[across], &[])?;
     let cells = AxisCells::new(filtered.axis(across).ok_or(PlotError::Nothing)?, MAX_POSITIONS);
     let empty = |_| Quantiles { cells: &cells, columns, values: vec![vec![f64::NAN; cells.len()]; columns.len()] };
     let mut quantiles: Vec<Quantiles> = groups.shown.iter().map(empty).collect();
@@ -137,7 +136,6 @@ fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Res
         });
     }
     figure.legend = quantiles.first().map_or_else(Vec::new, Quantiles::legend);
-    figure.notes.extend(along);
     Ok((figure, vec![across.to_owned()]))
 }
 
