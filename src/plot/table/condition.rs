@@ -1,28 +1,22 @@
 //! Conditions on rows: `--where "a=0.03"`.
 
+use std::cmp::Ordering;
+
 use crate::dataset::frame::Cells;
 use crate::plot::PlotError;
 
-/// The relation of a cell to a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Relation {
-    Equal,
-    Unequal,
-    Less,
-    AtMost,
-    Greater,
-    AtLeast,
-}
+const EQUAL: &[Ordering] = &[Ordering::Equal];
+const UNEQUAL: &[Ordering] = &[Ordering::Less, Ordering::Greater];
 
-/// The signs of relations; signs of two characters come first, since they begin like others.
-const SIGNS: [(&str, Relation); 7] = [
-    ("<=", Relation::AtMost),
-    (">=", Relation::AtLeast),
-    ("!=", Relation::Unequal),
-    ("==", Relation::Equal),
-    ("=", Relation::Equal),
-    ("<", Relation::Less),
-    (">", Relation::Greater),
+/// The signs and the orders of a cell and a value that each allows; signs of two characters come first, since they begin like others.
+const SIGNS: [(&str, &[Ordering]); 7] = [
+    ("<=", &[Ordering::Less, Ordering::Equal]),
+    (">=", &[Ordering::Greater, Ordering::Equal]),
+    ("!=", UNEQUAL),
+    ("==", EQUAL),
+    ("=", EQUAL),
+    ("<", &[Ordering::Less]),
+    (">", &[Ordering::Greater]),
 ];
 
 /// Number of digits by which numbers are equal. Chosen: tables on the terminal show nine.
@@ -33,7 +27,8 @@ const EQUAL_DIGITS: i32 = 9;
 pub struct Condition {
     /// The column.
     pub column: String,
-    relation: Relation,
+    /// The orders of a cell and a value that it allows.
+    orders: &'static [Ordering],
     /// The number or word, or several for `in`.
     pub values: Vec<String>,
 }
@@ -61,12 +56,12 @@ impl Condition {
     fn one(text: &str) -> Result<Condition, PlotError> {
         let wrong = || no_condition(text);
         // The first sign; of several at one position, the longest, which comes first in `SIGNS`.
-        let found = SIGNS.iter().filter_map(|(sign, relation)| Some((text.find(sign)?, sign.len(), *relation)));
+        let found = SIGNS.iter().filter_map(|(sign, orders)| Some((text.find(sign)?, sign.len(), *orders)));
         // In ASCII alone, places are those of the text.
         let lower = text.to_ascii_lowercase();
         let list = lower.find(" in ").or_else(|| lower.find(" in("));
-        let found = found.chain(list.map(|place| (place, " in".len(), Relation::Equal)));
-        let (place, length, relation) = found.min_by_key(|(place, ..)| *place).ok_or_else(wrong)?;
+        let found = found.chain(list.map(|place| (place, " in".len(), EQUAL)));
+        let (place, length, orders) = found.min_by_key(|(place, ..)| *place).ok_or_else(wrong)?;
         let (column, typed) = (text[..place].trim(), text[place + length..].trim());
         let values = if list == Some(place) {
             let inside = typed.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).ok_or_else(wrong)?;
@@ -78,7 +73,7 @@ impl Condition {
         if column.is_empty() {
             return Err(wrong());
         }
-        Ok(Condition { column: column.to_owned(), relation, values })
+        Ok(Condition { column: column.to_owned(), orders, values })
     }
 
     /// The text of the condition.
@@ -90,34 +85,18 @@ impl Condition {
     }
 
     fn sign(&self) -> &'static str {
-        SIGNS.iter().rev().find(|(_, relation)| *relation == self.relation).map_or("=", |(sign, _)| sign)
+        SIGNS.iter().rev().find(|(_, orders)| *orders == self.orders).map_or("=", |(sign, _)| sign)
     }
 
     /// Whether a number meets the condition; NaN never does.
     pub fn holds(&self, cell: f64) -> bool {
-        self.numbers().any(|value| {
-            let equal = is_equal(cell, value);
-            match self.relation {
-                Relation::Equal => equal,
-                Relation::Unequal => !equal && !cell.is_nan(),
-                Relation::Less => cell < value && !equal,
-                Relation::AtMost => cell < value || equal,
-                Relation::Greater => cell > value && !equal,
-                Relation::AtLeast => cell > value || equal,
-            }
-        })
+        let order = |value| if is_equal(cell, value) { Ordering::Equal } else { cell.total_cmp(&value) };
+        !cell.is_nan() && self.numbers().any(|value| self.orders.contains(&order(value)))
     }
 
     /// Whether a number from `low` to `high` may meet the condition.
     pub fn may_hold(&self, low: f64, high: f64) -> bool {
-        match self.relation {
-            Relation::Equal => {
-                self.numbers().any(|value| low <= value && value <= high) || self.holds(low) || self.holds(high)
-            }
-            Relation::Unequal => low != high || self.holds(low),
-            Relation::Less | Relation::AtMost => self.holds(low),
-            Relation::Greater | Relation::AtLeast => self.holds(high),
-        }
+        self.holds(low) || self.holds(high) || self.numbers().any(|value| low < value && value < high)
     }
 
     fn numbers(&self) -> impl Iterator<Item = f64> {
@@ -137,7 +116,7 @@ impl Condition {
     /// The word in an equality.
     pub fn word(&self) -> Option<&str> {
         match self.values.as_slice() {
-            [value] if self.relation == Relation::Equal => Some(value),
+            [value] if self.orders == EQUAL => Some(value),
             _ => None,
         }
     }
@@ -166,11 +145,12 @@ impl Condition {
 
     /// Whether a word meets the condition.
     pub fn holds_word(&self, word: Option<&str>) -> bool {
-        match self.relation {
-            Relation::Equal => word.is_some_and(|word| self.values.iter().any(|value| value == word)),
-            Relation::Unequal => word.is_some_and(|word| self.values.iter().all(|value| value != word)),
+        let is_in = |word: &str| self.values.iter().any(|value| value == word);
+        word.is_some_and(|word| match self.orders {
+            EQUAL => is_in(word),
+            UNEQUAL => !is_in(word),
             _ => false,
-        }
+        })
     }
 }
 
