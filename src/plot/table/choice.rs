@@ -232,13 +232,7 @@ impl<'a> Choice<'a> {
     fn value(&self) -> Result<String, PlotError> {
         let Choice { filtered, defaults, .. } = self;
         for class in defaults.classes.iter().filter(|class| filtered.has(class)) {
-            let (mut seen, mut varies) = (None, false);
-            filtered.each_while(&[class], |row| {
-                varies |= row[0].is_finite() && seen.is_some_and(|seen| seen != row[0]);
-                seen = seen.or(Some(row[0]).filter(|place| place.is_finite()));
-                !varies
-            })?;
-            if varies {
+            if filtered.values(&[class])?.0.iter().any(Values::varies) {
                 return Ok((*class).to_owned());
             }
         }

@@ -451,7 +451,7 @@ impl FilteredTable {
     }
 
     /// The values of columns in the selected rows, and the number of these rows.
-    fn values(&self, names: &[&str]) -> Result<(Vec<Values>, u64), PlotError> {
+    pub fn values(&self, names: &[&str]) -> Result<(Vec<Values>, u64), PlotError> {
         let axis = |name: &&str| Values {
             name: (*name).to_owned(),
             unit: self.unit(name),
