@@ -122,9 +122,8 @@ impl Axis {
 /// A layer between axes. Positions are axis values, unless stated as fractions.
 #[derive(Debug, Clone)]
 pub enum Layer {
-    /// The background where a map has no data: hatched.
-    Hatch,
-    /// Colours that fill the panel: a PNG image, first row at the top, and the values under the pointer, for HTML pages.
+    /// Colours that fill the panel, which is hatched where there are none: a PNG image, first row at the top, and the values under the pointer,
+    /// for HTML pages.
     Map(Vec<u8>, Hover),
     /// A line through points.
     Line(Vec<(f64, f64)>, Stroke),
@@ -529,8 +528,10 @@ impl Panel {
         let place = |point| self.place(area, point);
         let pieces = |line: &Vec<(f64, f64)>| pieces(line.iter().map(|point| place(*point)));
         match layer {
-            Layer::Hatch => canvas.hatch(area),
-            Layer::Map(png, _) => canvas.image(area, png),
+            Layer::Map(png, _) => {
+                canvas.hatch(area);
+                canvas.image(area, png);
+            }
             Layer::Line(line, stroke) => canvas.lines(&pieces(line), stroke),
             Layer::Contour(lines, stroke) => {
                 draw_contour(canvas, &lines.iter().flat_map(pieces).collect::<Vec<_>>(), stroke);

@@ -214,7 +214,7 @@ impl Raster {
         Ok(sheets)
     }
 
-    /// The dots of a panel and their names, or its cells on a hatched background.
+    /// The dots of a panel and their names, or its cells.
     fn layers(&self, sheet: &PanelCells, shading: &Shading<'_>) -> Vec<Layer> {
         if self.are_dots {
             let dot = |((at, _), &value): (&((f64, f64), String), &f64)| {
@@ -225,8 +225,7 @@ impl Raster {
             return vec![Layer::Marks(sheet.dots.iter().zip(&sheet.value).map(dot).collect()), Layer::Names(names)];
         }
         let image = pixels(&self.cells, |cell| shading.colour(sheet.value[cell]));
-        let filled = image.map(|png| Layer::Map(png, hover(&self.cells, sheet, shading)));
-        [Layer::Hatch].into_iter().chain(filled).collect()
+        image.map(|png| Layer::Map(png, hover(&self.cells, sheet, shading))).into_iter().collect()
     }
 
     /// A note about cells with several rows.
