@@ -274,23 +274,20 @@ impl FilteredTable {
     }
 
     /// The label of a group of rows, as [`FilteredTable::label`]; for empty cells, as in `no material`.
-    pub fn label_of_group(&self, cells: &[f64]) -> String {
-        match (self.label(&self.label_columns(), cells), self.labels.first()) {
-            (label, Some((name, _))) if label.is_empty() => format!("no {}", label::literal(name)),
+    pub fn label_of_group(&self, names: &[&str], cells: &[f64]) -> String {
+        match (self.label(names, cells), names.first()) {
+            (label, Some(name)) if label.is_empty() => format!("no {}", label::literal(name)),
             (label, _) => label,
         }
     }
 
     /// The words of the labels `names` in markup, from the cells of a row; empty for empty cells.
     pub fn label(&self, names: &[&str], cells: &[f64]) -> String {
-        let words: Vec<String> = names.iter().zip(cells).filter_map(|(name, cell)| self.word_of(name, *cell)).collect();
-        words.join(", ")
-    }
-
-    /// The word of a label in markup, from its cell.
-    pub fn word_of(&self, label: &str, cell: f64) -> Option<String> {
-        let (_, words) = self.labels.iter().find(|(name, _)| name == label)?;
-        Some(label::literal(words.get(cell as usize).filter(|_| !cell.is_nan())?))
+        let word = |(label, cell): (&&str, &f64)| {
+            let (_, words) = self.labels.iter().find(|(name, _)| name == label)?;
+            Some(label::literal(words.get(*cell as usize).filter(|_| !cell.is_nan())?))
+        };
+        names.iter().zip(cells).filter_map(word).collect::<Vec<_>>().join(", ")
     }
 
     /// The labels that name a dot: one that determines all others, if there is one; without the label in the legend, and none with too many words.

@@ -384,9 +384,9 @@ fn find(
         let (at, cells) = cells.split_at(drawn[0].len());
         let mut values = values.to_vec();
         makes.merge(axes, &mut values);
-        let name = || if label.is_empty() { String::new() } else { filtered.label_of_group(label) };
-        let new = |values: Vec<f64>| FoundGroup { values, label: name(), has_value: false };
-        let (group, known) = found.entry(bits(&values)).or_insert_with(|| (new(values), bits(label)));
+        let place = bits(&values);
+        let new = || FoundGroup { values, label: filtered.label_of_group(&labels, label), has_value: false };
+        let (group, known) = found.entry(place).or_insert_with(|| (new(), bits(label)));
         if *known != bits(label) {
             group.label.clear();
         }
@@ -429,12 +429,12 @@ fn joined(found: &[FoundGroup], of_points: &[usize]) -> Vec<Vec<f64>> {
 }
 
 /// The values of the axes and labels numbered `of` in markup, without missing ones.
-fn in_words(filtered: &FilteredTable, axes: &[impl AsRef<str>], of: &[usize], values: &[f64]) -> Vec<String> {
+fn in_words(filtered: &FilteredTable, axes: &[&str], of: &[usize], values: &[f64]) -> Vec<String> {
     let text = |&axis: &usize| {
-        let (name, value) = (axes[axis].as_ref(), values[axis]);
+        let (name, value) = (axes[axis], values[axis]);
         match filtered.axis(name) {
             Some(axis) => (!value.is_nan()).then(|| axis.text_of(value)),
-            None => Some(filtered.word_of(name, value).unwrap_or_else(|| format!("no {}", label::literal(name)))),
+            None => Some(filtered.label_of_group(&[name], &[value])),
         }
     };
     of.iter().filter_map(text).collect()
