@@ -46,7 +46,7 @@ pub fn series(place: usize) -> Stroke {
 }
 
 /// Fills of classes. Chosen: as many as strategies of an optimum, none of the same grey as its neighbours.
-const CLASSES: [[u8; 3]; 7] = [
+pub const CLASSES: [[u8; 3]; 7] = [
     [0xd7, 0xe8, 0xf5],
     [0x2a, 0x5f, 0x9e],
     [0xf2, 0xc4, 0x5a],

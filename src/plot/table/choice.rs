@@ -197,7 +197,8 @@ impl<'a> Choice<'a> {
     fn two_axes(&self, wants_map: bool) -> Result<Option<(String, String)>, PlotError> {
         let Choice { filtered, defaults, varying, .. } = self;
         let longest = varying.iter().map(|axis| axis.values.len()).max().unwrap_or(0);
-        let is_scattered = defaults.scatters && varying.len() > 1 && filtered.rows <= 2 * longest as u64;
+        let is_scattered =
+            defaults.scatters && varying.len() > 1 && filtered.rows <= (map::MAX_SCATTERED_RATIO * longest) as u64;
         let least = if wants_map || is_scattered { 2 } else { defaults.least_map };
         // The axes of labelled points are points, not a grid: they make no map with another axis.
         let is_of_point = |axis: &str| filtered.is_of_point(axis);

@@ -16,10 +16,10 @@ pub const MAX_POSITIONS: usize = 4096;
 
 /// Ratio of height to width of a single panel, and of several above each other. Chosen: curves rise by about 45 degrees, and all panels fit on a
 /// page.
-const ASPECTS: [f64; 2] = [0.7, 0.45];
+pub const ASPECTS: [f64; 2] = [0.7, 0.45];
 
 /// Space beyond the first and the last point, as a fraction of the axes. Chosen: no mark touches the frame.
-const MARK_ROOM: [f64; 2] = [0.02, 0.06];
+pub const MARK_ROOM: [f64; 2] = [0.02, 0.06];
 
 /// The plan of lines.
 #[derive(Debug, Clone)]

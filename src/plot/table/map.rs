@@ -22,13 +22,13 @@ const MAX_CELLS_OF_SEVERAL: usize = 480;
 const SPARSE_FILL: f64 = 0.25;
 
 /// Ratio of rows to the values of the longer axis up to which rows are scattered points, such as materials. Chosen: no grid has fewer rows.
-const MAX_SCATTERED_RATIO: usize = 2;
+pub const MAX_SCATTERED_RATIO: usize = 2;
 
 /// Greatest number of dots of a panel; with more rows, several fall in one cell. Chosen: more dots overlap.
 const MAX_DOTS: f64 = 5000.0;
 
 /// Space beyond the first and the last dot, as a fraction of the axis. Chosen: no dot touches the frame in a panel of a third of a page.
-const DOT_ROOM: f64 = 0.04;
+pub const DOT_ROOM: f64 = 0.04;
 
 /// Pixels along an axis with cells of unequal width. Chosen: more than its cells.
 const PIXELS: usize = 1024;

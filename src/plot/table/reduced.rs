@@ -4,15 +4,16 @@ use super::PROTOCOL_DEFAULTS;
 use super::cells::AxisCells;
 use super::filtered::FilteredTable;
 use super::groups::Groups;
-use super::lines::MAX_POSITIONS;
+use super::lines::{ASPECTS, MARK_ROOM, MAX_POSITIONS};
+use super::map::DOT_ROOM;
 use crate::plot::canvas::Stroke;
 use crate::plot::figure::{Axis, Entry, Figure, Key, Layer, MAX_MARKED_POINTS, Panel};
 use crate::plot::scale::Scale;
 use crate::plot::{PlotError, colour, label};
 use crate::table::{self, HISTOGRAM_EDGES, Table};
 
-/// Shades of the outer and of the inner quantiles. Chosen: a light and a medium blue, as in maps of words.
-const OUTER: [u8; 3] = [0xd7, 0xe8, 0xf5];
+/// Shades of the outer and of the inner quantiles. Chosen: a light and a medium blue, the first as in maps of words.
+const OUTER: [u8; 3] = colour::CLASSES[0];
 const INNER: [u8; 3] = [0x9e, 0xc4, 0xe4];
 
 /// The columns of quantiles, each with its fraction of shortcuts.
@@ -65,8 +66,8 @@ pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), Plot
     let last = (0..edges.len()).rev().find(is_used).unwrap_or(first);
     let x = Scale { low: edges[first].0, high: edges[last].1, log: true };
     let most = counts.iter().flatten().fold(0.0_f64, |most, count| most.max(*count));
-    let y = Scale { low: 0.0, high: 1.06 * most, log: false };
-    let mut figure = groups.figure(0.7);
+    let y = Scale { low: 0.0, high: (1.0 + MARK_ROOM[1]) * most, log: false };
+    let mut figure = groups.figure(ASPECTS[0]);
     for (place, counts) in counts.iter().enumerate() {
         let bars = edges.iter().zip(counts).map(|(&(from, to), &count)| (from, to, count));
         figure.panels.push(Panel {
@@ -125,12 +126,12 @@ fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Res
         quantiles[group].values.iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
     })?;
     let all = quantiles.iter().flat_map(|drawn| drawn.values.iter().flatten().copied());
-    let y = Scale::of(all).ok_or(PlotError::Nothing)?.with_room(0.04);
-    let mut figure = groups.figure(0.7);
+    let y = Scale::of(all).ok_or(PlotError::Nothing)?.with_room(DOT_ROOM);
+    let mut figure = groups.figure(ASPECTS[0]);
     for (group, drawn) in quantiles.iter().enumerate() {
         figure.panels.push(Panel {
             title: groups.title(group),
-            x: Axis::new(across, &filtered.unit(across), cells.ends().with_room(0.02)),
+            x: Axis::new(across, &filtered.unit(across), cells.ends().with_room(MARK_ROOM[0])),
             y: Axis::new("gap", "1", y),
             layers: drawn.layers(),
         });
@@ -183,12 +184,13 @@ fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<(Fi
         points = row.iter().copied().zip(columns.iter().map(|(_, fraction)| 100.0 * fraction)).collect();
     })?;
     points.retain(|(gap, _): &(f64, f64)| gap.is_finite());
-    let x = Scale::of(points.iter().map(|(gap, _)| *gap)).ok_or(PlotError::Nothing)?.with_room(0.04);
+    let x = Scale::of(points.iter().map(|(gap, _)| *gap)).ok_or(PlotError::Nothing)?.with_room(DOT_ROOM);
+    let y = Scale { low: 0.0, high: 100.0, log: false }.with_room(DOT_ROOM);
     let panel = Panel {
         title: String::new(),
         x: Axis::new("gap", "1", x),
-        y: Axis::new("shortcuts of at most this gap", "%", Scale { low: 0.0, high: 100.0, log: false }.with_room(0.04)),
+        y: Axis::new("shortcuts of at most this gap", "%", y),
         layers: vec![Layer::Line(points.clone(), Stroke::solid("#000", 1.1)), Layer::marks(points, 0)],
     };
-    Ok((Figure { columns: 1, aspect: 0.7, panels: vec![panel], ..Figure::default() }, Vec::new()))
+    Ok((Figure { columns: 1, aspect: ASPECTS[0], panels: vec![panel], ..Figure::default() }, Vec::new()))
 }
