@@ -106,75 +106,53 @@ pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), Plot
     }
 }
 
-/// The values of each column along an axis; empty for a column that was not written.
-struct Quantiles<'a> {
-    cells: &'a AxisCells,
-    columns: &'a [(&'a str, f64)],
-    values: Vec<Vec<f64>>,
-}
-
+/// The quantiles over an axis; bands and curves of columns that were not written are left out.
 fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
     let groups = Groups::of_panels(filtered, &[across], &[])?;
     let cells = AxisCells::new(filtered.axis(across).ok_or(PlotError::Nothing)?, MAX_POSITIONS);
-    let empty = |_| Quantiles { cells: &cells, columns, values: vec![vec![f64::NAN; cells.len()]; columns.len()] };
-    let mut quantiles: Vec<Quantiles> = groups.shown.iter().map(empty).collect();
+    // For each group and column, the value at each position.
+    let mut quantiles = vec![vec![vec![f64::NAN; cells.len()]; columns.len()]; groups.shown.len()];
     let names = columns.iter().map(|(name, _)| *name);
     let wanted: Vec<&str> = [across].into_iter().chain(names).chain(groups.axes.iter().map(String::as_str)).collect();
     filtered.each(&wanted, |row| {
         let (found, key) = row[1..].split_at(columns.len());
         let (Some(group), Some(place)) = (groups.place(key), cells.place(row[0])) else { return };
-        quantiles[group].values.iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
+        quantiles[group].iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
     })?;
-    let all = quantiles.iter().flat_map(|drawn| drawn.values.iter().flatten().copied());
+    let all = quantiles.iter().flatten().flatten().copied();
     let y = Scale::of(all).ok_or(PlotError::Nothing)?.with_room(DOT_ROOM);
+    let is_marked = cells.exact && cells.len() < MAX_MARKED_POINTS;
+    let place = |name: &str| columns.iter().position(|(column, _)| *column == name);
     let mut figure = groups.figure(ASPECTS[0]);
-    for (group, drawn) in quantiles.iter().enumerate() {
+    for (group, values) in quantiles.iter().enumerate() {
+        let points = |column: usize| cells.middles.iter().copied().zip(values[column].iter().copied());
+        let mut layers = Vec::new();
+        for (low, high, shade, _) in BANDS {
+            let (Some(low), Some(high)) = (place(low), place(high)) else { continue };
+            let points = points(low).zip(&values[high]).map(|((x, low), high)| (x, low, *high));
+            layers.push(Layer::Band(points.collect(), shade));
+        }
+        for (name, _, series) in CURVES {
+            let Some(column) = place(name) else { continue };
+            layers.push(Layer::Line(points(column).collect(), colour::series(series)));
+            layers.extend(is_marked.then(|| Layer::marks(points(column).collect(), series)));
+        }
         figure.panels.push(Panel {
             title: groups.title(group),
             x: Axis::new(across, &filtered.unit(across), cells.ends().with_room(MARK_ROOM[0])),
             y: Axis::new("gap", "1", y),
-            layers: drawn.layers(),
+            layers,
         });
     }
-    figure.legend = quantiles.first().map_or_else(Vec::new, Quantiles::legend);
+    let entry = |key, text: &str| Entry { key, text: text.to_owned() };
+    for (_, text, series) in CURVES.into_iter().filter(|(name, ..)| place(name).is_some()) {
+        figure.legend.push(entry(Key::series(series, is_marked), text));
+    }
+    let is_drawn = |(low, high, ..): &(&str, &str, _, _)| place(low).and(place(high)).is_some();
+    for (.., shade, text) in BANDS.into_iter().rev().filter(is_drawn) {
+        figure.legend.push(entry(Key::Fill(shade), text));
+    }
     Ok((figure, vec![across.to_owned()]))
-}
-
-impl Quantiles<'_> {
-    fn column(&self, name: &str) -> Option<&[f64]> {
-        self.values.get(self.columns.iter().position(|(column, _)| *column == name)?).map(Vec::as_slice)
-    }
-
-    fn is_marked(&self) -> bool {
-        self.cells.exact && self.cells.len() < MAX_MARKED_POINTS
-    }
-
-    fn layers(&self) -> Vec<Layer> {
-        let mut layers = Vec::new();
-        for (low, high, shade, _) in BANDS {
-            let (Some(low), Some(high)) = (self.column(low), self.column(high)) else { continue };
-            let points = self.cells.middles.iter().zip(low.iter().zip(high));
-            layers.push(Layer::Band(points.map(|(x, (low, high))| (*x, *low, *high)).collect(), shade));
-        }
-        for (name, _, series) in CURVES {
-            let Some(column) = self.column(name) else { continue };
-            let points: Vec<(f64, f64)> = self.cells.middles.iter().copied().zip(column.iter().copied()).collect();
-            layers.push(Layer::Line(points.clone(), colour::series(series)));
-            if self.is_marked() {
-                layers.push(Layer::marks(points, series));
-            }
-        }
-        layers
-    }
-
-    fn legend(&self) -> Vec<Entry> {
-        let is_there = |name: &str| self.column(name).is_some();
-        let curves = CURVES.into_iter().filter(|(name, ..)| is_there(name));
-        let curves = curves.map(|(_, text, series)| (Key::series(series, self.is_marked()), text));
-        let bands = BANDS.into_iter().rev().filter(|(low, high, ..)| is_there(low) && is_there(high));
-        let bands = bands.map(|(.., shade, text)| (Key::Fill(shade), text));
-        curves.chain(bands).map(|(key, text)| Entry { key, text: text.to_owned() }).collect()
-    }
 }
 
 fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
