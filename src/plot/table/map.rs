@@ -202,7 +202,7 @@ impl Raster {
             // A cell with several rows shows the least value; NaN is above any number.
             if sheet.status[cell] == 0 || found < sheet.value[cell] || sheet.value[cell].is_nan() {
                 sheet.value[cell] = found;
-                sheet.status[cell] = status.min((Status::ALL.len() - 1) as f64) as u8 + 1;
+                sheet.status[cell] = status as u8 + 1;
             }
             if status == f64::from(Status::Ok as u8)
                 && !found.is_nan()
@@ -251,8 +251,7 @@ impl Shading<'_> {
         // A gap has a logarithmic scale, without rounding; one below 0 has a colour of its own.
         let scale = match Scale::of(values().filter(|value| *value > least_gap)) {
             Some(positive) if column == "gap" && positive.high > positive.low => Scale { log: true, ..positive },
-            _ if all.high > all.low => all,
-            _ => all.with_room(0.05),
+            _ => all.with_room(0.0),
         };
         Ok(Shading { column, words, colours: Some(Axis::new(column, &filtered.unit(column), scale)), least_gap })
     }
@@ -281,7 +280,6 @@ impl Shading<'_> {
     fn colour(&self, value: f64) -> Option<[u8; 3]> {
         (!value.is_nan()).then(|| match &self.colours {
             _ if self.is_below(value) => BELOW_ZERO,
-            Some(Axis { scale, .. }) if scale.log && value <= 0.0 => viridis(0.0),
             Some(Axis { scale, .. }) => viridis(scale.fraction(value)),
             None => class(self.shade(value)),
         })
