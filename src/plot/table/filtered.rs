@@ -61,18 +61,12 @@ impl Values {
         self.words.get(value as usize).filter(|_| value >= 0.0)
     }
 
-    /// A value in markup.
-    pub fn shown(&self, value: f64) -> String {
+    /// Name and value in markup, with a unit; a word has no name.
+    pub fn text_of(&self, value: f64) -> String {
         match self.word(value) {
             Some(word) => word.replace('_', " "),
-            None => label::number_among(value, &self.values),
+            None => label::equation(&self.name, &label::number_among(value, &self.values), &self.unit),
         }
-    }
-
-    /// Name and value in markup, with a unit in SI; a word has no name.
-    pub fn text_of(&self, value: f64) -> String {
-        let shown = self.shown(value);
-        if self.words.is_empty() { label::equation(&self.name, &shown, &self.unit) } else { shown }
     }
 
     /// The values as typed by a user: all if they are few, else the least and the greatest.
