@@ -27,9 +27,9 @@ use crate::protocol::Status;
 pub use column::{Column, Field, Kind, STATUS, STATUS_DOC, columns, number};
 pub use column_buffer::{ColumnBuffer, Phase, Projection, RunStats, Signal, Stopped};
 pub use optimum_cache::{OPTIMUM_AXES, OptimumCache, uncapped_optimum};
+#[cfg(feature = "plot")]
+pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MAX_SORTED;
-#[cfg(feature = "read")]
-pub(crate) use reduced::{BLOCK_ROWS, EDGES as HISTOGRAM_EDGES};
 
 /// A table: the axes of its rows, its columns and its computation.
 pub struct Table {

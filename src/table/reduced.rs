@@ -113,7 +113,7 @@ const fn reduced(
 }
 
 /// Rows of a landscape in memory at a time. Chosen: a few megabytes.
-pub const BLOCK_ROWS: usize = 1 << 16;
+const BLOCK_ROWS: usize = 1 << 16;
 
 /// Greatest number of shortcuts of a row of `gap_quantiles`, whose gaps are sorted in memory. Chosen: 16 MB of gaps for each thread.
 pub const MAX_SORTED: u64 = 1 << 21;
