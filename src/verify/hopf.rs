@@ -13,11 +13,6 @@ type Vector = Vector3<Number>;
 
 const ZERO: Number = Number::new(0.0, 0.0);
 
-/// `y` with `matrix y = right`; NaN for a singular matrix.
-fn solve(matrix: Matrix3<Number>, right: Vector) -> Vector {
-    matrix.lu().solve(&right).unwrap_or_else(|| Vector::from_element(Number::new(f64::NAN, 0.0)))
-}
-
 /// A Hopf point: derivatives of the evolution law, material, and scaled mass `m v^2`.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
@@ -55,21 +50,6 @@ fn evolution([second, third]: [f64; 2], vectors: [[Number; 2]; 3]) -> [Number; 2
     [p * q * second + u * q + v * p, p * q * r * third - once * second - twice]
 }
 
-/// The coefficient of a flow at its Hopf point: its frequency, Jacobian, eigenvectors `q` and `p`, and the forms of its second and third derivatives.
-fn lyapunov(
-    omega: f64,
-    jacobian: Matrix3<f64>,
-    [q, p]: [Vector; 2],
-    second: impl Fn(&Vector, &Vector) -> Vector,
-    third: impl Fn(&Vector, &Vector, &Vector) -> Vector,
-) -> f64 {
-    let (mirrored, jacobian) = (q.conjugate(), jacobian.map(|x| Number::new(x, 0.0)));
-    let still = solve(jacobian, second(&q, &mirrored));
-    let double = solve(Matrix3::from_diagonal_element(Number::new(0.0, 2.0 * omega)) - jacobian, second(&q, &q));
-    let sum = third(&q, &q, &mirrored) - second(&q, &still) * Number::new(2.0, 0.0) + second(&mirrored, &double);
-    (p.dotc(&sum) / p.dotc(&q)).re / (2.0 * omega)
-}
-
 impl Point {
     /// The coefficient; `None` where there is no Hopf point or where it is degenerate.
     fn coefficient(&self) -> Option<f64> {
@@ -103,7 +83,11 @@ impl Point {
             (jacobian, one, Vector::new(i / (omega * mass), one * (b / mass) / (i * omega - one), one))
         };
         let q = Vector::new(i * (k / omega), -one / (one + i * omega), last);
-        Some(lyapunov(omega, jacobian, [q, p], second, third))
+        let (mirrored, jacobian) = (q.conjugate(), jacobian.map(|x| Number::new(x, 0.0)));
+        let still = jacobian.lu().solve(&second(&q, &mirrored))?;
+        let double = (Matrix3::from_diagonal_element(i * (2.0 * omega)) - jacobian).lu().solve(&second(&q, &q))?;
+        let sum = third(&q, &q, &mirrored) - second(&q, &still) * Number::new(2.0, 0.0) + second(&mirrored, &double);
+        Some((p.dotc(&sum) / p.dotc(&q)).re / (2.0 * omega))
     }
 
     /// Rounding of the coefficient. Chosen: a hundred roundings of its terms, which have `a/mass` in them.
