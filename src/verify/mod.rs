@@ -27,7 +27,7 @@ use crate::sweep::{self, Spec};
 use crate::table::{self, Table};
 use checked_row::{Checked, CheckedRow, Context, Difference};
 use sample::Sample;
-pub(crate) use units::scale;
+pub(crate) use units::{relative, scale};
 
 /// Difference above which a number is an error, in units of `rtol`. Chosen: room for the errors of the second route.
 pub const MAX_DIFFERENCE_RTOLS: f64 = 10.0;
@@ -103,7 +103,7 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
         let own = spec.tables.get(key).and_then(|table| table.rtol);
         let rtol = own.or(definition.and_then(Table::default_rtol)).unwrap_or(spec.accuracy.rtol);
         let Sample { mut rows, missing, fault } = sample::rows(&folder, manifest, table, sample, seed);
-        let relative = relative(&folder, table);
+        let relative = relative(&headings(&folder, table));
         let context = Context { bounded, friction, relative, rtol };
         // Reduced rows are compared as they were written.
         if let Some(table) = definition.filter(|_| reduced.is_none()) {
@@ -149,14 +149,11 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     Ok(audits)
 }
 
-/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration, by the units of its first part.
-fn relative(folder: &Folder, table: &ManifestTable) -> [bool; 2] {
+/// The columns of the first part of `table` that can be read.
+fn headings(folder: &Folder, table: &ManifestTable) -> Vec<frame::Heading> {
     let parts = folder.parts_there(table);
     let headings = parts.iter().find_map(|&part| frame::headings(&folder.part(&table.name, part)).ok());
-    let headings = headings.map(|(headings, _)| headings).unwrap_or_default();
-    // In any system of units.
-    ["alpha_2", "alpha_3"]
-        .map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
+    headings.map(|(headings, _)| headings).unwrap_or_default()
 }
 
 impl Audit {

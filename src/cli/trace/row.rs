@@ -13,7 +13,7 @@ use crate::protocol::Status;
 use crate::sweep::{Spec, friction, units};
 use crate::table::{self, Table};
 use crate::trace::{self, Pathless};
-use crate::verify::scale;
+use crate::verify::{relative, scale};
 
 impl Arguments {
     /// The protocol of a row of a table.
@@ -41,11 +41,7 @@ impl Arguments {
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
         let friction = friction(&spec.model)?;
-        let headings = frame::headings(&part).map_err(Failure::failed)?.0;
-        let relative = [Quantity::Alpha2, Quantity::Alpha3].map(|alpha| {
-            let heading = headings.iter().find(|heading| heading.name == alpha.name());
-            heading.is_some_and(|heading| heading.unit == units.name(alpha.unit(Scale::Duration)))
-        });
+        let relative = relative(&frame::headings(&part).map_err(Failure::failed)?.0);
         let definition = table::find(name);
         let mut scaled = written.clone();
         if let Some(definition) = definition {
