@@ -168,9 +168,11 @@ impl<'a> CheckedRow<'a> {
         };
         // A number that cannot be compared is an error, not an agreement.
         let size = if difference.is_nan() { f64::INFINITY } else { difference };
+        let shown = |number: f64| format!("{number:.3e}");
         let expected = match expected {
-            Some(expected) if (scale / expected.abs() - 1.0).abs() > SAME_SCALE => {
-                format!("{expected:?}, relative to {scale:.3e}")
+            // Unless the digits of both are the same.
+            Some(expected) if shown(scale) != shown(expected.abs()) => {
+                format!("{expected:?}, relative to {}", shown(scale))
             }
             Some(expected) => format!("{expected:?}"),
             None => "nothing".to_owned(),
@@ -226,9 +228,6 @@ impl<'a> CheckedRow<'a> {
         self.judge(STATUS, holds, if expected { name } else { other });
     }
 }
-
-/// Relative difference of a scale from the number below which it is not stated. Chosen: it does not change the shown digits of a difference.
-const SAME_SCALE: f64 = 1e-3;
 
 /// The status of a path with friction below 0.
 pub const NEGATIVE: &str = "negative_friction";

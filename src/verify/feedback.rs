@@ -4,6 +4,7 @@ use super::optimal::Optimum;
 use super::task::Task;
 use super::{Checked, CheckedRow};
 use crate::model::{Law, Transition};
+use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::protocol::optimal::ArcKind;
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
@@ -54,6 +55,6 @@ fn gain(task: &Task, optimum: &Optimum, near: &Optimum) -> Option<(f64, f64)> {
     };
     let slope = |step: f64| Some((v(step)? - v(-step)?) / (2.0 * step * theta));
     let (wide, narrow) = (slope(2.0 * THETA_STEP_RTOL)?, slope(THETA_STEP_RTOL)?);
-    let noise = (near.start.v - v_start).abs().max(1e-12 * v_start) / (THETA_STEP_RTOL * theta);
+    let noise = (near.start.v - v_start).abs().max(LONG_ROUNDING_RTOL * v_start) / (THETA_STEP_RTOL * theta);
     Some((narrow + (narrow - wide) / 3.0, (narrow - wide).abs() + noise))
 }

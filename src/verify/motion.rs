@@ -1,8 +1,8 @@
 //! Errors of a traced protocol in the equations of motion: integral identities on half of each of its intervals, which determine the motion.
 
 use crate::model::{Friction, Law, StateLaw};
-use crate::numerics::golden_section;
 use crate::numerics::radau::{NODES, Nodes, radau};
+use crate::numerics::{LONG_ROUNDING_RTOL, golden_section};
 use crate::protocol::{Moment, Motion, SpringBlock};
 
 /// A traced protocol, with its work and its errors in the equations.
@@ -36,10 +36,6 @@ const SLOPE_ROUNDING: f64 = 2e4 * f64::EPSILON;
 
 /// Rounding of a time in the slopes of a polynomial through sixteen of them. Chosen: four roundings for each value.
 const TIME_ROUNDING: f64 = 64.0 * f64::EPSILON;
-
-/// Relative accuracy of the motions of optima and of their duration, and error of theta above which an interval may be split. Chosen: a hundredth of
-/// the default `rtol`.
-pub const MOTION_RTOL: f64 = 1e-12;
 
 /// Relative difference between the works by one rule over an interval and by the rules of its halves, above which it may be split. Derived: rules of
 /// sixteen nodes converge geometrically, and half the interval squares the ratio; the halves are then good to rounding.
@@ -128,7 +124,7 @@ impl Followed {
         let noise = halves.iter().flat_map(|half| &half.at).map(rounding).fold(0.0, f64::max);
         let change = after.theta - before.theta;
         let error = ((change - growth) / after.theta).abs() - noise;
-        if splits > 0 && (error > MOTION_RTOL || !self.resolves_work([from, to], &halves)) {
+        if splits > 0 && (error > LONG_ROUNDING_RTOL || !self.resolves_work([from, to], &halves)) {
             return self.interval([from, middle], splits - 1) + self.interval([middle, to], splits - 1);
         }
         let changes = [change.abs(), growth.abs(), noise * after.theta];

@@ -4,10 +4,11 @@
 //! so `C = a v - (tau + a)/theta`, with `a tanh(tau/a)` for `a` if friction is regularised; on the floor it rises with `v`, on a ceiling it falls. What it falls by is the multiplier of the bound, whose
 //! integral is a derivative of the work.
 
-use super::motion::{Followed, MOTION_RTOL};
+use super::motion::Followed;
 use super::task::Task;
 use super::{Checked, CheckedRow, relaxed};
 use crate::model::{Friction, Law, StateLaw, Transition};
+use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::protocol::optimal::{ArcKind, Bounds};
 use crate::protocol::{Moment, SpringBlock, Status};
 
@@ -125,7 +126,7 @@ impl Task {
     /// The optimum of a time that rounding does not distinguish from `t_f`.
     pub fn near(&self) -> Option<Optimum> {
         let at = |t_f: f64| Task { t_f, ..*self }.certify().ok();
-        at(self.t_f * (1.0 + MOTION_RTOL)).or_else(|| at(self.t_f * (1.0 - MOTION_RTOL)))
+        at(self.t_f * (1.0 + LONG_ROUNDING_RTOL)).or_else(|| at(self.t_f * (1.0 - LONG_ROUNDING_RTOL)))
     }
 }
 
@@ -198,7 +199,7 @@ impl Optimum {
             let is_time = column.starts_with("time");
             let size = if is_time && !has_ceilings && expected == 0.0 { t_f } else { expected.abs() };
             let own = if column == "hamiltonian" { self.c_noise } else { 0.0 };
-            let rounding = (other - expected).abs() + if is_time { MOTION_RTOL * t_f } else { 0.0 };
+            let rounding = (other - expected).abs() + if is_time { LONG_ROUNDING_RTOL * t_f } else { 0.0 };
             let noise = own + if has_ceilings { rounding } else { 0.0 };
             row.compare_relative(column, expected, size + noise / rtol);
         }
@@ -225,7 +226,7 @@ impl Optimum {
 
     /// Compares the words for the times on the floor and on both ceilings, unless rounding decides them.
     fn compare_words(&self, row: &mut CheckedRow<'_>, times: [f64; 3]) {
-        let is_clear = |&time: &f64| time == 0.0 || time > 10.0 * MOTION_RTOL * self.task.t_f;
+        let is_clear = |&time: &f64| time == 0.0 || time > 10.0 * LONG_ROUNDING_RTOL * self.task.t_f;
         if self.task.bounds.has_ceilings() && !times.iter().all(is_clear) {
             return;
         }

@@ -7,21 +7,16 @@ use super::route::integrate;
 use super::{Checked, CheckedRow};
 use crate::dataset::{Cell, Row};
 use crate::model::{Law, StateLaw, Transition};
+use crate::numerics::{LONG_ROUNDING_RTOL, NEGLIGIBLE_LN};
 use crate::protocol::Solved;
 use crate::protocol::relaxed;
 use crate::table::STATUS;
-
-/// Slip on a bound after which theta is steady to rounding. Derived: both laws forget its start as `e^-slip`.
-const STEADY_SLIP: f64 = 60.0;
 
 /// Slip of the longest arc on the ceiling. Chosen: beyond, rounding of its end may decide the price there.
 const MAX_SLIP: f64 = 5000.0;
 
 /// Difference of `ln theta` at which a price is above its minimum. Chosen: a minimum is flat to half the digits.
 const PRICE_STEP: f64 = 1e-4;
-
-/// Change of `ln theta` below which a piece counts as absent. Chosen: above rounding.
-const NO_SLIDE: f64 = 1e-12;
 
 /// A law, a material and its ceiling.
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +59,8 @@ impl Block {
         if v > 1.0 && all > MAX_SLIP {
             return None;
         }
-        let slip = all.clamp(0.0, STEADY_SLIP);
+        // Both laws forget the start as e^-slip; then theta is steady to rounding.
+        let slip = all.clamp(0.0, NEGLIGIBLE_LN);
         let slope = |y: &[f64; 3]| [self.rate(y[0], v) / v, self.friction(y[0], v), y[0]];
         let [end, work, by_b] = integrate(slope, [w, 0.0, 0.0], (0.0, slip))?;
         let rest = all - slip;
@@ -216,7 +212,7 @@ fn bang_bang(row: &mut CheckedRow<'_>, block: &Block, arcs: &Arcs, strategy: &st
 /// velocities `around` the turn.
 fn compare_extremes(row: &mut CheckedRow<'_>, block: &Block, arcs: [(f64, f64, f64); 2], around: &[f64]) {
     for (column, (v, from, to)) in ["v_start", "v_end"].into_iter().zip(arcs) {
-        if (to - from).abs() > NO_SLIDE * (1.0 + from.abs()) {
+        if (to - from).abs() > LONG_ROUNDING_RTOL * (1.0 + from.abs()) {
             row.compare(column, v);
         }
     }

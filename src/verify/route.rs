@@ -3,6 +3,8 @@
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::{Dop853, SVector, System};
 
+use crate::numerics::TIGHT_RTOL;
+
 struct Slope<F>(F);
 
 impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> System<f64, SVector<f64, N>> for Slope<F> {
@@ -11,11 +13,8 @@ impl<const N: usize, F: Fn(&[f64; N]) -> [f64; N]> System<f64, SVector<f64, N>> 
     }
 }
 
-/// Relative tolerance of the integrator.
-const RTOL: f64 = 1e-13;
-
 /// Relative difference of integrated numbers below which rounding decides. Chosen: a hundred times the tolerance.
-pub const UNCLEAR_RTOL: f64 = 100.0 * RTOL;
+pub const UNCLEAR_RTOL: f64 = 100.0 * TIGHT_RTOL;
 
 /// Greatest number of steps of one integration. Chosen: more mean a stiff motion.
 const MAX_STEPS: u32 = 20_000;
@@ -37,7 +36,7 @@ pub fn integrate<const N: usize>(
         to,
         length,
         start,
-        RTOL,
+        TIGHT_RTOL,
         1e-15,
         0.9,
         0.0,

@@ -8,6 +8,7 @@ use super::route::UNCLEAR_RTOL;
 use super::task::{Task, min_duration};
 use super::{Checked, CheckedRow, relaxed};
 use crate::model::{StateLaw, Transition};
+use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::numerics::double_double::DoubleDouble;
 use crate::protocol::cubic::Landscape;
 use crate::protocol::optimal::Bounds;
@@ -78,7 +79,8 @@ impl CheckedRow<'_> {
     fn compare_small_gap(&mut self, least: f64, followed: &Followed, gap_rtol: f64) {
         self.compare("work_optimal", least);
         let excess = followed.work - least;
-        let rounding = followed.rounding(|at| at.friction * at.v) + 1e-12 * (followed.work.abs() + least.abs());
+        let rounding =
+            followed.rounding(|at| at.friction * at.v) + LONG_ROUNDING_RTOL * (followed.work.abs() + least.abs());
         let scale = (gap_rtol * excess.abs() + rounding) / self.context.rtol;
         self.compare_relative("gap", excess / least, scale / least.abs());
     }

@@ -4,6 +4,7 @@ use super::motion::{Followed, bisect};
 use super::route::integrate;
 use super::{Checked, CheckedRow, MAX_DIFFERENCE_RTOLS, hopf};
 use crate::model::{Law, StateLaw, Transition};
+use crate::numerics::MAX_PANELS;
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::SteadySliding;
 use crate::stability::step_response::{Outcome, SETTLED, VelocityStep};
@@ -14,9 +15,6 @@ const MIN_OVERSHOOT: f64 = 1e-3;
 
 /// Number of cycles after the decision in which a response approaches its limit cycle. Chosen: a typical multiplier of 0.5 leaves 1e-9.
 const MORE_CYCLES: f64 = 30.0;
-
-/// Greatest number of intervals of a checked response. Chosen: limits the time of a check.
-const MAX_INTERVALS: usize = 10_000;
 
 /// Distance of two successive cycles, in rtol, beyond which they determine no limit cycle. Chosen: three digits are left at the default `rtol`.
 const MAX_CYCLE_RTOLS: f64 = 1e3;
@@ -167,7 +165,7 @@ fn follow(row: &mut CheckedRow<'_>, step: VelocityStep) -> Result<Followed, &'st
     let more = response.cycle.map_or(0.0, |cycle| MORE_CYCLES * cycle.period);
     // The slope of the velocity, which determines the time of the peak, has fewer digits than the velocity.
     let motion = step.motion(response.t_end + more, 0.01 * rtol);
-    let motion = motion.filter(|motion| motion.landmarks().len() <= MAX_INTERVALS);
+    let motion = motion.filter(|motion| motion.landmarks().len() <= MAX_PANELS as usize);
     let motion = motion.ok_or("responses of more than 10,000 steps")?;
     let VelocityStep { state_law, transition: Transition { law, .. }, k, m } = step;
     let followed = Followed::new(Box::new(motion), state_law, &SpringBlock { law, k, m }, 0);

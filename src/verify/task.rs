@@ -1,9 +1,9 @@
 //! An optimal transition under bounds: which durations and ceilings are feasible.
 
 use super::CheckedRow;
-use super::motion::MOTION_RTOL;
 use super::route::{UNCLEAR_RTOL, integrate};
 use crate::model::{Friction, Transition, friction_margin};
+use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::protocol::optimal::Bounds;
 use crate::protocol::{Motion, Status, arcsinh, optimal};
 
@@ -23,9 +23,6 @@ type Limits = Result<(f64, f64), Option<&'static str>>;
 
 /// Distance of a friction ceiling from steady sliding, in `mu_0 sigma`, below which rounding decides. Chosen: a hundred roundings.
 const STEADY_NOISE: f64 = 2e-14;
-
-/// Time in units of its largest slope, below which it is integrated again in its own unit. Derived: the absolute tolerance of 1e-15 is then 1e-12.
-const SMALL_TIME: f64 = 1e-3;
 
 impl Task {
     /// The transition between steady sliding with logarithmic friction.
@@ -47,8 +44,8 @@ impl Task {
             return (solved.status, motion);
         }
         let (solved, motion) = match theta {
-            Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, MOTION_RTOL),
-            None => optimal::motion(problem, t_f, bounds, MOTION_RTOL),
+            Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, LONG_ROUNDING_RTOL),
+            None => optimal::motion(problem, t_f, bounds, LONG_ROUNDING_RTOL),
         };
         (solved.status, motion)
     }
@@ -116,14 +113,14 @@ impl Task {
             let part = |time, ends: &[f64]| Some(integrate(slope, [ends[0], time], (ends[0], ends[1]))?[1]);
             Some(unit * edges.windows(2).try_fold(0.0, part)?)
         };
-        // In units of its largest slope the time may be so small that the absolute tolerance of the integrator leaves too few digits.
+        // In units of its largest slope the time may be so small that the absolute tolerance of the integrator leaves too few digits: its own unit is
+        // better.
         let steepest = rate(0.0).abs().max(rate(1.0).abs());
         if steepest == 0.0 {
             // Without ceilings.
             return Some(0.0);
         }
-        let first = time(steepest)?;
-        if first.abs() > SMALL_TIME * steepest { Some(first) } else { time(first) }
+        time(time(steepest)?)
     }
 
     /// The least and the greatest feasible time; `None` where rounding decides.
