@@ -10,7 +10,9 @@ use super::{Checked, CheckedRow, relaxed};
 use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::protocol::optimal::{ArcKind, Bounds};
+use crate::protocol::shortcut::Case;
 use crate::protocol::{Moment, SpringBlock, Status};
+use crate::trace::Protocol;
 
 /// The certified optimum of a task.
 pub struct Optimum {
@@ -98,11 +100,17 @@ impl Task {
     ///
     /// The reason why it cannot be certified.
     pub fn certify(&self) -> Result<Optimum, &'static str> {
-        let (status, motion) = self.solve();
-        let motion = motion.ok_or("there is no motion of the optimum")?;
-        let Task { problem: Transition { law, v_f, .. }, t_f, .. } = *self;
+        let Task { problem: transition, theta, t_f, bounds, form } = *self;
+        let protocol = match theta {
+            _ if form == Friction::Regularised => Protocol::OptimalRegularised,
+            Some(theta) => Protocol::OptimalFrom { theta, bounds },
+            None => Protocol::Optimal { bounds },
+        };
+        let case = Case { transition, t_f, tau_ceiling: bounds.tau_ceiling };
+        let path = protocol.path(&case, LONG_ROUNDING_RTOL).map_err(|_| "there is no motion of the optimum")?;
+        let Transition { law, v_f, .. } = transition;
         let rigid = SpringBlock { law, k: f64::INFINITY, m: 0.0 };
-        let motion = Followed::new(motion, StateLaw::Ageing, &rigid, MAX_SPLITS);
+        let motion = Followed::new(path.motion, StateLaw::Ageing, &rigid, MAX_SPLITS);
         let slip = |kind| motion.integral(|at| if self.arc(at) == kind { at.v } else { 0.0 });
         let (growth, slips) = (law.b / law.a - 1.0, [ArcKind::VCeiling, ArcKind::TauCeiling].map(slip));
         let sits = self.sits() && (motion.end().v / v_f - 1.0).abs() <= 2.0 * f64::EPSILON;
@@ -113,7 +121,7 @@ impl Task {
         let (c, size) = conserved.iter().copied().min_by(|x, y| x.1.total_cmp(&y.1)).unwrap_or((f64::NAN, f64::NAN));
         let drift = conserved.iter().map(|(other, size)| (other - c).abs() / size).fold(0.0, f64::max);
         // Where friction is too low for a proof, a bound may hold the optimum back.
-        let proven = matches!(status, Status::Ok | Status::BelowBound);
+        let proven = matches!(path.status, Status::Ok | Status::BelowBound);
         let wrong = motion.samples.iter().filter(|_| proven).map(|(_, at)| self.wrong(at)).fold(0.0, f64::max);
         let (start, end) = (motion.samples[0].1, motion.end());
         let arrival =

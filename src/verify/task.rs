@@ -3,9 +3,7 @@
 use super::CheckedRow;
 use super::route::{UNCLEAR_RTOL, integrate};
 use crate::model::{Friction, Transition, friction_margin};
-use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::protocol::optimal::Bounds;
-use crate::protocol::{Motion, Status, arcsinh, optimal};
 
 /// A transition to steady sliding in a given time, under bounds.
 #[derive(Debug, Clone, Copy)]
@@ -34,20 +32,6 @@ impl Task {
     pub fn of(row: &CheckedRow<'_>) -> Result<Task, &'static str> {
         let task = Task::new(&row.transition()?, row.axis("t_f")?, row.bounds());
         Ok(Task { form: row.context.friction, ..task })
-    }
-
-    /// The status of the optimum, and its motion.
-    pub fn solve(&self) -> (Status, Option<Box<dyn Motion>>) {
-        let Task { ref problem, theta, t_f, bounds, form } = *self;
-        if form == Friction::Regularised {
-            let (solved, motion) = arcsinh::motion(problem, t_f);
-            return (solved.status, motion);
-        }
-        let (solved, motion) = match theta {
-            Some(theta) => optimal::motion_from(problem.law, theta, t_f, problem.v_f, bounds, LONG_ROUNDING_RTOL),
-            None => optimal::motion(problem, t_f, bounds, LONG_ROUNDING_RTOL),
-        };
-        (solved.status, motion)
     }
 
     /// State variable at the start.
