@@ -37,7 +37,7 @@ fn axis(py: Python<'_>, quantity: Quantity) -> PyResult<Bound<'_, PyDict>> {
     dict.set_item("doc", quantity.doc())?;
     dict.set_item("unit", quantity.unit(Scale::Model))?;
     dict.set_item("scales", quantity.scales().iter().map(|scale| quantity.unit(*scale)).collect::<Vec<_>>())?;
-    dict.set_item("range", quantity.domain().text)?;
+    dict.set_item("range", quantity.domain().to_string())?;
     dict.set_item("words", quantity.words())?;
     dict.set_item("default", default)?;
     dict.set_item("default_count", quantity.default().len())?;

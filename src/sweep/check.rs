@@ -362,7 +362,7 @@ pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
     if RTOL.contains(rtol) {
         return Ok(());
     }
-    refuse(key, format!("{rtol:?} is out of range"), RTOL.text, "choose a value in the range")
+    refuse(key, format!("{rtol:?} is out of range"), RTOL.to_string(), "choose a value in the range")
 }
 
 /// Checks that `spec` requests tables, and none that is unknown.

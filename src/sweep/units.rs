@@ -75,13 +75,11 @@ pub fn legal(units: &Units, quantity: Quantity, scale: Scale, value: f64) -> Res
 fn range(units: &Units, quantity: Quantity, unit: &'static str) -> String {
     let (domain, size, name) = (quantity.domain(), units.size(unit), units.name(unit));
     if name == unit {
-        return domain.text.to_owned();
+        return domain.to_string();
     }
     let name = if name == "1" { String::new() } else { format!(" {name}") };
-    let below = if domain.least_excluded { "<" } else { "<=" };
-    let apart = domain.apart.map_or(String::new(), |apart| format!(", or {apart}"));
-    let [least, greatest, size] = [domain.least * size, domain.greatest * size, size].map(number);
-    format!("{least} {below} {} <= {greatest}{name}{apart} ({unit} = {size}{name})", quantity.name())
+    let words = domain.words(|end| number(end * size), &name);
+    format!("{words} ({unit} = {}{name})", number(size))
 }
 
 /// The help for velocities that look scaled in a spec with SI units.
