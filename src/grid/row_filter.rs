@@ -112,10 +112,11 @@ impl RowFilter {
         for (place, level) in self.levels.iter().enumerate() {
             count /= level.read;
             let start = self.before(first);
-            let kept_below = |step: u64| free * (self.before(first + step * count) - start);
-            let step = last_below(level.read, |step| kept_below(step) <= rest);
-            rest -= kept_below(step);
+            // The kept combination of this row, if all rows before it had as many free steps.
+            let combination = self.kept.select((start + rest / free) as u32).map_or(first, u64::from);
+            let step = (combination - first) / count;
             first += step * count;
+            rest -= free * (self.before(first) - start);
             row = row * level.read + step;
             if place + 1 == self.levels.len() {
                 break;
@@ -154,6 +155,12 @@ fn in_chunks<T: Send>(count: u64, each: impl Fn(Range<u64>, &mut Scratch) -> T +
     }
 }
 
+/// `points` in batches that are evaluated at a time.
+fn batches(points: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+    let starts = points.clone().step_by(BATCH_POINTS as usize);
+    starts.map(move |start| start..(start + BATCH_POINTS).min(points.end))
+}
+
 /// A bit for each of `visible` combinations: whether `condition` holds for any of its `hidden` points.
 fn evaluate(
     sampler: &Sampler<'_>,
@@ -163,34 +170,16 @@ fn evaluate(
     scratch: &mut Scratch,
 ) -> Vec<u8> {
     let mut bits = vec![0; (visible.end - visible.start).div_ceil(8) as usize];
-    let end = visible.end * hidden;
-    let mut start = visible.start * hidden;
-    while start < end {
-        let stop = (start + BATCH_POINTS).min(end);
-        sampler.load(start..stop, scratch);
-        for (place, &holds) in condition.evaluate(scratch).iter().enumerate() {
+    for points in batches(visible.start * hidden..visible.end * hidden) {
+        sampler.load(points.clone(), scratch);
+        for (point, &holds) in points.zip(condition.evaluate(scratch)) {
             if holds != 0.0 {
-                let bit = (start + place as u64) / hidden - visible.start;
+                let bit = point / hidden - visible.start;
                 bits[(bit / 8) as usize] |= 1 << (bit % 8);
             }
         }
-        start = stop;
     }
     bits
-}
-
-/// The last number below `count` for which `holds` is true, by bisection.
-fn last_below(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
-    let (mut low, mut high) = (0, count);
-    while high - low > 1 {
-        let middle = low + (high - low) / 2;
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
 }
 
 /// A wrong value, and its point as axis values.
@@ -203,21 +192,14 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     let roots = block.roots(&reads);
     let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MAX_COMBINATIONS)?;
     let sampler = Sampler::new(block, &digits, &[quantity], block.condition.as_ref());
-    let search = |rows: Range<u64>, scratch: &mut Scratch| -> Option<u64> {
-        let mut start = rows.start;
-        while start < rows.end {
-            let stop = (start + BATCH_POINTS).min(rows.end);
-            sampler.load(start..stop, scratch);
+    let search = |rows: Range<u64>, scratch: &mut Scratch| {
+        batches(rows).find_map(|rows| {
+            sampler.load(rows.clone(), scratch);
             let kept = block.condition.as_ref().map(|condition| condition.evaluate(scratch).to_vec());
             let values = scratch.column(quantity);
-            let found =
-                (0..values.len()).find(|&i| kept.as_ref().is_none_or(|kept| kept[i] != 0.0) && wrong(values[i]));
-            if let Some(place) = found {
-                return Some(start + place as u64);
-            }
-            start = stop;
-        }
-        None
+            let is_found = |&i: &usize| kept.as_ref().is_none_or(|kept| kept[i] != 0.0) && wrong(values[i]);
+            (0..values.len()).find(is_found).map(|place| rows.start + place as u64)
+        })
     };
     let found = in_chunks(digits.rows, search).into_iter().flatten().next();
     Some(found.map(|row| {
