@@ -24,11 +24,11 @@ impl Segment {
         self.first + (self.raw.end - self.raw.start)
     }
 
-    /// The intersection with `rows` of the table.
+    /// The intersection with `rows` of the table, which may be empty.
     fn cut(&self, rows: &Range<u64>) -> Segment {
         let (start, end) = (rows.start.max(self.first), rows.end.min(self.end()));
-        let raw = self.raw.start + (start - self.first)..self.raw.start + (end - self.first);
-        Segment { block: self.block, first: start, raw }
+        let raw = |row: u64| self.raw.start + row.saturating_sub(self.first);
+        Segment { block: self.block, first: start, raw: raw(start)..raw(end) }
     }
 }
 
@@ -46,11 +46,7 @@ impl<'a> View<'a> {
 
     fn segments(&self, rows: Range<u64>) -> impl Iterator<Item = Segment> + '_ {
         let first = self.segments.partition_point(|segment| segment.end() <= rows.start);
-        let inside = self.segments[first..].iter().take_while({
-            let end = rows.end;
-            move |segment| segment.first < end
-        });
-        inside.map(move |segment| segment.cut(&rows)).filter(|segment| !segment.raw.is_empty())
+        self.segments[first..].iter().map(move |segment| segment.cut(&rows)).take_while(|segment| !segment.raw.is_empty())
     }
 
     /// The values at `row`, one of the rows.
