@@ -39,7 +39,7 @@ impl Design {
                 let mut random = Pcg64::seed_from_u64(u64::from(axis) << 32 | u64::from(seed));
                 let mut parts: Vec<u32> = (0..count as u32).collect();
                 for last in (1..parts.len()).rev() {
-                    parts.swap(last, below(&mut random, last as u64 + 1) as usize);
+                    parts.swap(last, below(&mut random, last as u64 + 1));
                 }
                 let inside = |random: &mut Pcg64| (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
                 parts.into_iter().map(|part| (f64::from(part) + inside(&mut random)) / count as f64).collect()
@@ -48,12 +48,7 @@ impl Design {
     }
 }
 
-/// A uniform random integer below `end` (Lemire's multiplication with rejection, TOMACS 2019).
-fn below(random: &mut Pcg64, end: u64) -> u64 {
-    loop {
-        let product = u128::from(random.next_u64()) * u128::from(end);
-        if product as u64 >= end.wrapping_neg() % end {
-            return (product >> 64) as u64;
-        }
-    }
+/// A random integer below `end`, by multiplication (Lemire, TOMACS 2019) without rejection: uniform up to a fraction of `end/2^64`.
+fn below(random: &mut Pcg64, end: u64) -> usize {
+    ((u128::from(random.next_u64()) * u128::from(end)) >> 64) as usize
 }
