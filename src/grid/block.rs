@@ -36,6 +36,12 @@ impl Label {
 }
 
 impl Factor {
+    /// The axis of `quantity` with its default values.
+    pub fn usual(quantity: Quantity) -> Factor {
+        let axis = Axis { quantity, scale: Scale::Model, values: Values::List(quantity.default()) };
+        Factor { axes: vec![axis], ..Factor::default() }
+    }
+
     /// Number of steps.
     pub fn len(&self) -> u64 {
         self.axes.first().map_or(0, |axis| axis.values.len())

@@ -60,10 +60,7 @@ pub fn check(spec: &BlockSpec, prefix: &str, units: &Units, folder: &Path) -> Re
         placed.extend(axes.iter().map(|axis| axis.quantity));
         factors.push(Factor { axes, ..Factor::default() });
     }
-    for quantity in defaults {
-        let axis = Axis { quantity, scale: Scale::Model, values: Values::List(quantity.default()) };
-        factors.push(Factor { axes: vec![axis], ..Factor::default() });
-    }
+    factors.extend(defaults.into_iter().map(Factor::usual));
     let derived = draft.derived()?;
     let condition = spec.condition.as_ref().map(|text| {
         let points = factors.first().filter(|_| spec.points.is_some());

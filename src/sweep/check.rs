@@ -12,7 +12,7 @@ use super::laws;
 use super::spec::{BlockSpec, Spec, TableSpec};
 use super::units::{doubtful_axis, doubtful_scales, units};
 use crate::file;
-use crate::grid::{Axis, Block, Factor, Grid, Quantity, RTOL, RowIndex, Scale, TooMany, Values};
+use crate::grid::{Block, Factor, Grid, Quantity, RTOL, RowIndex, TooMany};
 use crate::model::{Friction, Units};
 use crate::names::nearest;
 use crate::table::{self, OPTIMUM_AXES, OptimumCache, Projection, STATUS, Table};
@@ -347,10 +347,7 @@ fn blocks(spec: &Spec, units: &Units, folder: &Path) -> Result<Vec<Block>, SpecE
                     return refuse(key, found, expected, "convert the values of one of them");
                 }
                 // All blocks share the column of a tacit axis.
-                None if quantity.is_tacit() => {
-                    let axis = Axis { quantity, scale: Scale::Model, values: Values::List(quantity.default()) };
-                    block.factors.push(Factor { axes: vec![axis], ..Factor::default() });
-                }
+                None if quantity.is_tacit() => block.factors.push(Factor::usual(quantity)),
                 _ => {}
             }
         }

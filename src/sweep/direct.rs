@@ -188,21 +188,17 @@ impl Direct<'_> {
 
     /// The factors: points that vary together, constants, axes of the grid, defaults.
     fn block(mut self) -> Block {
-        let axis =
-            |scale: Scale, quantity: Quantity, values: Vec<f64>| Axis { quantity, scale, values: Values::List(values) };
         let (points, grid) = (std::mem::take(&mut self.points), std::mem::take(&mut self.grid));
+        let axis = |(quantity, values)| Axis { quantity, scale: self.scale_of(quantity), values: Values::List(values) };
+        let factor = |axes: Vec<Axis>| Factor { axes, ..Factor::default() };
         let (constants, together): (Given, Given) = points.into_iter().partition(|(_, values)| values.len() == 1);
-        let together: Vec<Axis> =
-            together.into_iter().map(|(quantity, values)| axis(self.scale_of(quantity), quantity, values)).collect();
+        let together: Vec<Axis> = together.into_iter().map(axis).collect();
         let mut factors: Vec<Factor> = Vec::with_capacity(self.table.axes().len());
-        factors.extend((!together.is_empty()).then_some(Factor { axes: together, labels: Vec::new() }));
-        for (quantity, values) in constants.into_iter().chain(grid) {
-            factors.push(Factor { axes: vec![axis(self.scale_of(quantity), quantity, values)], labels: Vec::new() });
-        }
+        factors.extend((!together.is_empty()).then(|| factor(together)));
+        factors.extend(constants.into_iter().chain(grid).map(|given| factor(vec![axis(given)])));
         for &quantity in self.table.axes() {
             if !quantity.is_tacit() && !factors.iter().any(|factor| factor.holds_any(&[quantity])) {
-                let axes = vec![axis(Scale::Model, quantity, quantity.default())];
-                factors.push(Factor { axes, labels: Vec::new() });
+                factors.push(Factor::usual(quantity));
             }
         }
         Block { factors, ..Block::default() }
