@@ -1,7 +1,6 @@
 //! A block: independent factors, computed axes, and a condition on its points. Rows of its product are numbers in mixed radix.
 
-use hashbrown::HashTable;
-use hashbrown::hash_table::Entry;
+use std::collections::HashMap;
 
 use super::axis::{Axis, Values};
 use super::expression::Expression;
@@ -62,27 +61,25 @@ impl Factor {
     /// Ranges are distinct by construction, so only what is stored value by value is compared.
     pub fn classes(&self, quantities: &[Quantity]) -> (u64, Option<Vec<u32>>) {
         let used: Vec<&Axis> = self.axes.iter().filter(|axis| quantities.contains(&axis.quantity)).collect();
-        if used.is_empty() || !used.iter().all(|axis| matches!(axis.values, Values::List(_))) {
+        if used.is_empty() || used.iter().any(|axis| is_monotone(&axis.values)) {
             return (self.len(), None);
         }
-        if used.iter().any(|axis| is_monotone(&axis.values)) {
-            return (self.len(), None);
+        let mut class_of = vec![0_u32; self.len() as usize];
+        let mut distinct = 0;
+        for axis in used {
+            let mut seen = HashMap::new();
+            for (step, class) in class_of.iter_mut().enumerate() {
+                let next = seen.len() as u32;
+                // -0 is another way to write 0.
+                let bits = (axis.values.at(step as u64) + 0.0).to_bits();
+                *class = *seen.entry((*class, bits)).or_insert(next);
+            }
+            distinct = seen.len() as u64;
+            if distinct == self.len() {
+                return (distinct, None);
+            }
         }
-        // -0 is another way to write 0.
-        let bits = |axis: &Axis, step: u32| (axis.values.at(step.into()) + 0.0).to_bits();
-        let hash = |step: u32| used.iter().fold(0, |hash, axis| mixed(hash ^ bits(axis, step)));
-        let mut seen: HashTable<(u32, u32)> = HashTable::with_capacity(self.len() as usize);
-        let mut class_of = Vec::with_capacity(self.len() as usize);
-        for step in 0..self.len() as u32 {
-            let is_same = |&(other, _): &(u32, u32)| used.iter().all(|axis| bits(axis, other) == bits(axis, step));
-            let next = seen.len() as u32;
-            class_of.push(match seen.entry(hash(step), is_same, |&(other, _)| hash(other)) {
-                Entry::Occupied(known) => known.get().1,
-                Entry::Vacant(free) => free.insert((step, next)).get().1,
-            });
-        }
-        let distinct = seen.len() as u64;
-        if distinct == self.len() { (distinct, None) } else { (distinct, Some(class_of)) }
+        (distinct, Some(class_of))
     }
 }
 
