@@ -409,7 +409,7 @@ fn request(
             return refuse(key, found, expected_axes(written.axes()), help);
         }
     }
-    let rtol = table_spec.rtol.or(table.default_rtol()).unwrap_or(spec.accuracy.rtol);
+    let rtol = spec.rtol_of(table.name());
     check_rtol(&format!("{key}.rtol"), rtol)?;
     let projection = projection(table, &key, columns)?;
 

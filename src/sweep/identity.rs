@@ -49,9 +49,8 @@ impl Sweep {
             }
         }
         let name = request.table.name();
-        let reduced = table::REDUCED.iter().any(|(_, table)| table.name() == name);
-        let written =
-            if reduced { table::find("gap").map(|gap| table::over(gap, false)) } else { None }.unwrap_or(request.table);
+        let gap = table::find("gap").filter(|_| table::is_reduced(name));
+        let written = gap.map_or(request.table, |gap| table::over(gap, false));
         let blocks = &self.grid.blocks;
         fact("block", format_args!("{}", blocks.len()));
         for (number, block) in blocks.iter().enumerate() {

@@ -9,6 +9,7 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 
 use crate::model::Friction;
+use crate::table;
 
 /// A sweep spec.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -83,6 +84,12 @@ impl Spec {
         let top = self.block.is_empty().then(|| (String::new(), &self.top));
         let blocks = self.block.iter().enumerate().map(|(number, block)| (format!("block[{number}]."), block));
         top.into_iter().chain(blocks)
+    }
+
+    /// The accuracy of the table `name`, which may be a reduction of `gap`.
+    pub fn rtol_of(&self, name: &str) -> f64 {
+        let own = self.tables.get(if table::is_reduced(name) { "gap" } else { name }).and_then(|table| table.rtol);
+        own.or_else(|| table::find(name)?.default_rtol()).unwrap_or(self.accuracy.rtol)
     }
 }
 

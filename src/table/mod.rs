@@ -142,6 +142,11 @@ pub fn find(name: &str) -> Option<&'static Table> {
     ALL.into_iter().chain(REDUCED.map(|(_, table)| table)).find(|table| table.name() == name)
 }
 
+/// Whether the table with this name is one of [`REDUCED`].
+pub fn is_reduced(name: &str) -> bool {
+    REDUCED.iter().any(|(_, table)| table.name() == name)
+}
+
 /// The words that `column` of a table can have; empty for a number, and for a label of a file of points.
 pub fn vocabulary(table: &str, column: &str) -> Vec<&'static str> {
     if column == STATUS {

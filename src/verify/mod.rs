@@ -24,10 +24,10 @@ use indexmap::IndexMap;
 use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
 use crate::model::{Friction, Units};
 use crate::sweep::{self, Spec};
-use crate::table::{self, Table};
+use crate::table;
 use checked_row::{Checked, CheckedRow, Context, Difference};
 use sample::Sample;
-pub(crate) use units::{relative, scale};
+pub(crate) use units::scale;
 
 /// Difference above which a number is an error, in units of `rtol`. Chosen: room for the errors of the second route.
 pub const MAX_DIFFERENCE_RTOLS: f64 = 10.0;
@@ -99,11 +99,9 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     for table in &manifest.tables {
         let definition = table::find(&table.name);
         let reduced = table::REDUCED.iter().find(|(_, known)| known.name() == table.name).map(|(word, _)| *word);
-        let key = if reduced.is_some() { "gap" } else { &table.name };
-        let own = spec.tables.get(key).and_then(|table| table.rtol);
-        let rtol = own.or(definition.and_then(Table::default_rtol)).unwrap_or(spec.accuracy.rtol);
+        let rtol = spec.rtol_of(&table.name);
         let Sample { mut rows, missing, fault } = sample::rows(&folder, manifest, table, sample, seed);
-        let relative = relative(&headings(&folder, table));
+        let relative = relative(&folder, table);
         let context = Context { bounded, friction, relative, rtol };
         // Reduced rows are compared as they were written.
         if let Some(table) = definition.filter(|_| reduced.is_none()) {
@@ -149,11 +147,14 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     Ok(audits)
 }
 
-/// The columns of the first part of `table` that can be read.
-fn headings(folder: &Folder, table: &ManifestTable) -> Vec<frame::Heading> {
+/// Whether `alpha_2`, `alpha_3` of `table` are given relative to the duration, by the units of its first part.
+pub(crate) fn relative(folder: &Folder, table: &ManifestTable) -> [bool; 2] {
     let parts = folder.parts_there(table);
     let headings = parts.iter().find_map(|&part| frame::headings(&folder.part(&table.name, part)).ok());
-    headings.map(|(headings, _)| headings).unwrap_or_default()
+    let headings = headings.map(|(headings, _)| headings).unwrap_or_default();
+    // In any system of units.
+    ["alpha_2", "alpha_3"]
+        .map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
 }
 
 impl Audit {

@@ -1,17 +1,9 @@
 //! A row of a dataset in the units of the model, in which it is checked.
 
-use crate::dataset::frame::Heading;
 use crate::dataset::{Cell, Row};
 use crate::grid::{Quantity, Scale};
 use crate::model::Units;
 use crate::table::{Kind, Table};
-
-/// Whether `alpha_2`, `alpha_3` are given relative to the duration, by the units of the columns.
-pub fn relative(headings: &[Heading]) -> [bool; 2] {
-    // In any system of units.
-    ["alpha_2", "alpha_3"]
-        .map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
-}
 
 /// Converts a row of `table` to the units of the model; `relative` determines which of `alpha_2`, `alpha_3` are given relative to the duration.
 pub fn scale(row: &mut Row, table: &Table, units: &Units, relative: [bool; 2]) {

@@ -1,6 +1,6 @@
 //! The protocol of a row of a dataset.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::description::{Named, si_name};
 use super::{Arguments, Failure, Origin, TraceRequest, dataset, no_table, refused, wrong};
@@ -37,11 +37,11 @@ impl Arguments {
             Some(row) => row,
             None => source.only_row(&self.conditions)?,
         };
-        let (part, written) = source.row(number)?;
+        let written = source.row(number)?;
         let spec = Spec::parse(&manifest.spec).map_err(Failure::failed)?;
         let units = units(&spec.model)?;
         let friction = friction(&spec.model)?;
-        let relative = relative(&frame::headings(&part).map_err(Failure::failed)?.0);
+        let relative = relative(&folder, table);
         let definition = table::find(name);
         let mut scaled = written.clone();
         if let Some(definition) = definition {
@@ -51,9 +51,6 @@ impl Arguments {
         let t_f = self.t_f.map(|t_f| units.scaled(Quantity::Time.unit(Scale::Model), t_f));
         let (protocol_name, protocol, case) = trace::protocol_of(name, &scaled, (friction, bounded, relative), t_f)
             .map_err(|reason| wrong(format!("{}: row {number} of `{name}`: {reason}", path.display())))?;
-        let key = if name == "gap_min" { "gap" } else { name };
-        let own = spec.tables.get(key).and_then(|table| table.rtol);
-        let own = own.or(definition.and_then(|table| table.default_rtol())).unwrap_or(spec.accuracy.rtol);
         let mut numbers = axes_of(&written, &units);
         numbers.extend(self.t_f.map(|t_f| Named::new("t_f", t_f, units.name("l/v_0"))));
         let word = |key: &str| {
@@ -70,7 +67,7 @@ impl Arguments {
             numbers,
             law,
             friction,
-            rtol: self.rtol.unwrap_or(own),
+            rtol: self.rtol.unwrap_or_else(|| spec.rtol_of(name)),
             units,
             origin: Some(Origin {
                 dataset: manifest.name.clone(),
@@ -119,7 +116,7 @@ struct RowSource<'a> {
 
 impl RowSource<'_> {
     /// Reads a row from its part.
-    fn row(&self, row: u64) -> Result<(PathBuf, Row), Failure> {
+    fn row(&self, row: u64) -> Result<Row, Failure> {
         let RowSource { path, folder, manifest, table } = self;
         if row >= table.rows {
             let (path, last) = (path.display(), table.rows.saturating_sub(1));
@@ -132,8 +129,7 @@ impl RowSource<'_> {
             wrong(format!("{}: row {row} is in a part that is missing\n  help: {help}", file.display()))
         })?;
         let place = usize::try_from(row - table.rows_of(part).start).map_err(Failure::failed)?;
-        let row = frame::row(&file, place).map_err(Failure::failed)?;
-        Ok((file, row))
+        frame::row(&file, place).map_err(Failure::failed)
     }
 
     /// The only row that meets all conditions.

@@ -135,7 +135,6 @@ impl FilteredTable {
         let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
         // The default for a damaged spec.
         let spec = Spec::parse(&manifest.spec).unwrap_or_default();
-        let rtol = spec.tables.get(name).and_then(|table| table.rtol).unwrap_or(spec.accuracy.rtol);
         let mut filtered = FilteredTable {
             table: name.to_owned(),
             headings,
@@ -146,7 +145,7 @@ impl FilteredTable {
             common_labels: Vec::new(),
             of_points: Vec::new(),
             gridded: Gridded::of(&spec),
-            least_gap: if DIFFERENCES.contains(&name) { rtol } else { 0.0 },
+            least_gap: if DIFFERENCES.contains(&name) { spec.rtol_of(name) } else { 0.0 },
             parts,
             conditions: conditions.to_vec(),
         };
