@@ -149,12 +149,10 @@ impl Sweep {
     ///
     /// The faults of the spec, with their lines.
     pub fn check(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        Sweep::checked(spec, text, folder).map_err(|fault| fault.located(text))
-    }
-
-    fn checked(spec: &Spec, text: &str, folder: &Path) -> Result<Sweep, SpecError> {
-        let (grid, friction) = independent(spec, folder)?;
-        let requests = all(spec.tables.iter().map(|(name, table)| request(name, table, spec, friction, &grid)))?;
+        let located = |fault: SpecError| fault.located(text);
+        let (grid, friction) = independent(spec, folder).map_err(located)?;
+        let requests = spec.tables.iter().map(|(name, table)| request(name, table, spec, friction, &grid));
+        let requests = all(requests).map_err(located)?;
         let warnings = doubtful_scales(&spec.model).into_iter().chain(unused(spec, &grid, &requests));
         // A condition may drop the points outside.
         let unconditional = spec.blocks().zip(&grid.blocks).filter(|(_, block)| block.condition.is_none());
@@ -171,7 +169,7 @@ impl Sweep {
             bounded: spec.model.velocity_bound && friction == Friction::Log,
             friction,
             optimum_rows: optimum_rows(&grid, &requests),
-            warnings: warnings.map(|warning| warning.located(text)).collect(),
+            warnings: warnings.map(located).collect(),
             requests,
             grid,
         })
@@ -364,13 +362,18 @@ pub(super) fn check_rtol(key: &str, rtol: f64) -> Result<(), SpecError> {
 
 /// Checks that `spec` requests tables, and none that is unknown.
 fn check_tables(spec: &Spec) -> Result<(), SpecError> {
-    let known = table::ALL.map(|table| table.name());
     if spec.tables.is_empty() {
-        let expected = format!("at least one of {}", known.join(", "));
+        let expected = format!("at least one of {}", table::ALL.map(|table| table.name()).join(", "));
         return refuse("tables", "no table is requested", expected, "add a line such as [tables.optimal]");
     }
-    let unknowns = spec.tables.keys().filter(|name| !known.contains(&name.as_str()));
-    all(unknowns.map(|name| Err::<(), _>(unknown(format!("tables.{name}"), "table", name, &known)))).map(|_| ())
+    all(spec.tables.keys().map(|name| table_of(name))).map(|_| ())
+}
+
+/// The table `name` of a spec, before any reduction.
+fn table_of(name: &str) -> Result<&'static Table, SpecError> {
+    let known = table::ALL.map(|table| table.name());
+    let place = known.iter().position(|known| *known == name);
+    place.map(|place| table::ALL[place]).ok_or_else(|| unknown(format!("tables.{name}"), "table", name, &known))
 }
 
 /// The table `name` of `spec`, requested as `table_spec`, over its rows of `grid`.
@@ -382,9 +385,7 @@ fn request(
     grid: &Grid,
 ) -> Result<Request, SpecError> {
     let key = format!("tables.{name}");
-    let Some(written) = table::ALL.into_iter().find(|table| table.name() == name) else {
-        return Err(unknown(key, "table", name, &table::ALL.map(|table| table.name())));
-    };
+    let written = table_of(name)?;
     let has_ceiling = grid.blocks.iter().any(|block| block.may_be(Quantity::VelocityCeiling, f64::is_finite));
     let has_laws = has_ceiling || grid.blocks.iter().any(|block| block.scale(Quantity::Law).is_some());
     // A reduced table is one of ageing, without ceilings.
