@@ -1,5 +1,6 @@
 //! The checked sweep: grid, tables and columns of a legal spec, or its faults.
 
+use std::collections::HashMap;
 use std::fs;
 use std::io::{self, Read};
 use std::iter;
@@ -192,20 +193,15 @@ impl Sweep {
         let users = self.requests.iter().filter(|request| request.needs_optimum(&self.grid));
         let span = users.map(|request| request.row_index.tuples(OPTIMUM_AXES).span()).max().unwrap_or(0);
         let tuples = self.optimum_tuples();
-        let mut stores: Vec<(u64, Arc<OptimumCache>)> = Vec::new();
-        let store = |request: &Request| {
+        let mut caches: HashMap<u64, Arc<OptimumCache>> = HashMap::new();
+        let cache = |request: &Request| {
             if !request.needs_optimum(&self.grid) {
                 return Arc::new(OptimumCache::new(0, 0));
             }
-            let key = request.rtol.to_bits();
-            if let Some((_, store)) = stores.iter().find(|(known, _)| *known == key) {
-                return store.clone();
-            }
-            let store = Arc::new(OptimumCache::new(tuples, span));
-            stores.push((key, store.clone()));
-            store
+            let new = || Arc::new(OptimumCache::new(tuples, span));
+            caches.entry(request.rtol.to_bits()).or_insert_with(new).clone()
         };
-        self.requests.iter().map(store).collect()
+        self.requests.iter().map(cache).collect()
     }
 }
 
@@ -279,12 +275,7 @@ fn optimum_rows(grid: &Grid, requests: &[Request]) -> Option<RowIndex> {
     if blocks.is_empty() {
         return None;
     }
-    // A table with these axes alone has the rows of the optimum.
-    let own = requests.iter().find(|request| request.table.axes() == OPTIMUM_AXES);
-    match own.filter(|_| blocks.len() == grid.blocks.len()) {
-        Some(request) => Some(request.row_index.clone()),
-        None => Grid { blocks, units: grid.units }.project(OPTIMUM_AXES).ok(),
-    }
+    Grid { blocks, units: grid.units }.project(OPTIMUM_AXES).ok()
 }
 
 /// Whether `name` is legal for a dataset.
