@@ -268,8 +268,8 @@ impl Run<'_> {
         let parts = Arc::new(Mutex::new(parts));
         let next = move || locked(&parts).recv();
         let write = move || {
-            while let Ok(part) = next() {
-                if let Err(error) = part.publish() {
+            while let Ok((table_run, number, bytes)) = next() {
+                if let Err(error) = table_run.publish(number, &bytes) {
                     self.fail(error);
                 }
             }
@@ -322,7 +322,7 @@ impl<'a> TableRun<'a> {
         let take =
             |number, buffer: Result<&ColumnBuffer, String>| match buffer.map(|buffer| self.encode(number, buffer)) {
                 // The receiver exists as long as a sender.
-                Ok(Ok(bytes)) => _ = to_writers.send(EncodedPart { table_run: self, number, bytes }),
+                Ok(Ok(bytes)) => _ = to_writers.send((self, number, bytes)),
                 Ok(Err(error)) => self.run.fail(error),
                 Err(message) => _ = locked(&self.panics).insert(number, message),
             };
@@ -379,24 +379,17 @@ impl<'a> TableRun<'a> {
         self.count(statistics);
         Ok(bytes)
     }
-}
 
-/// A part before publication.
-struct EncodedPart<'a> {
-    table_run: &'a TableRun<'a>,
-    number: u64,
-    bytes: Vec<u8>,
-}
-
-impl EncodedPart<'_> {
-    /// Writes the part.
-    fn publish(self) -> Result<(), RunError> {
-        let EncodedPart { table_run, number, bytes } = self;
+    /// Writes an encoded part.
+    fn publish(&self, number: u64, bytes: &[u8]) -> Result<(), RunError> {
         // A stopped run does not write queued parts.
-        table_run.run.signal.check()?;
-        Ok(table_run.run.session.write_part(&table_run.table.name, number, &bytes)?)
+        self.run.signal.check()?;
+        Ok(self.run.session.write_part(&self.table.name, number, bytes)?)
     }
 }
+
+/// A part before publication: its table, number and bytes.
+type EncodedPart<'a> = (&'a TableRun<'a>, u64, Vec<u8>);
 
 /// The first part that panicked, in the order of tables and parts.
 fn first_panic(table_runs: &[TableRun<'_>]) -> Result<(), RunError> {
