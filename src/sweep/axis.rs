@@ -7,6 +7,9 @@ use super::units::{help, legal};
 use crate::grid::{Axis, Design, Quantity, Scale, Values};
 use crate::model::Units;
 
+/// Greatest number of values of a range: from 2^53 on a double may differ from the integer in the spec.
+pub const MAX_COUNT: u64 = (1 << 53) - 1;
+
 /// The definition of an axis.
 pub enum Written {
     /// Its values.
@@ -182,8 +185,7 @@ impl AxisDraft<'_> {
 
     fn range(self, form: &str, numbers: &[f64]) -> Result<Written, SpecError> {
         let key = &format!("{}.{form}", self.key);
-        // From 2^53 on a double may differ from the integer in the spec.
-        let (first, last, count) = self.ends(key, numbers, 2, (1 << 53) - 1)?;
+        let (first, last, count) = self.ends(key, numbers, 2, MAX_COUNT)?;
         let geometric = form == "geomspace";
         if geometric && (first == 0.0 || last == 0.0 || (first < 0.0) != (last < 0.0)) {
             let found = format!("from {first:?} to {last:?} passes through zero");

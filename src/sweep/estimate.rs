@@ -13,7 +13,7 @@ use super::check::{Request, Sweep};
 use super::engine::{RunError, WRITERS, content, locked, pool};
 use super::plan::Plan;
 use crate::dataset::{DatasetError, Footer, Layout, Manifest, atomic, encode};
-use crate::grid::Point;
+use crate::grid::{Point, SPLIT_MIX_INCREMENT};
 use crate::table::{ColumnBuffer, Job, OptimumCache, Signal, uncapped_optimum};
 
 /// Time for all samples of a sweep. Chosen: `plan` answers within two seconds where rows cost about the same.
@@ -338,8 +338,7 @@ fn shortest(samples: &[(u64, CostSample)]) -> Option<(u64, CostSample)> {
 /// Range number `place` of a sample, which has `length` of the `rows`: any consecutive ranges lie nearly evenly among them.
 fn place_of(rows: u64, place: u64, length: u64) -> Range<u64> {
     // Multiples of the golden ratio, modulo 1, are spread most evenly (Knuth, The Art of Computer Programming 3, section 6.4, theorem S).
-    const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-    let part = (place + 1).wrapping_mul(GOLDEN);
+    let part = (place + 1).wrapping_mul(SPLIT_MIX_INCREMENT);
     let length = length.min(rows);
     let start = ((u128::from(part) * u128::from(rows - length + 1)) >> 64) as u64;
     start..start + length

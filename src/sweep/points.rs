@@ -85,7 +85,7 @@ fn unknown_axis(path: &Path, name: &str) -> SpecError {
 const MAX_POINTS: usize = 1 << 22;
 
 /// Greatest size of a file, in bytes: 64 for each of [`MAX_POINTS`].
-const MAX_FILE_BYTES: u64 = 1 << 28;
+const MAX_FILE_BYTES: u64 = 64 * MAX_POINTS as u64;
 
 /// Opens a file that fits into memory: a regular file of at most [`MAX_FILE_BYTES`].
 fn check_size(path: &Path) -> Result<File, SpecError> {

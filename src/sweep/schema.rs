@@ -6,10 +6,11 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value, json};
 
-use super::axis::unit_name;
+use super::axis::{MAX_COUNT, unit_name};
 use super::check::MAX_NAME_BYTES;
+use super::spec::AccuracySpec;
 use crate::grid::{Design, Domain, Quantity, RTOL, Scale};
-use crate::model::{Scales, Units};
+use crate::model::{Friction, Scales, Units};
 use crate::table::{self, STATUS, Table};
 
 /// The schema, in draft 7, which editors support.
@@ -65,8 +66,8 @@ fn own() -> Value {
     let model = json!({
         "velocity_bound": { "type": "boolean", "default": true, "description": "Whether optimal protocols obey v >= 1" },
         "friction": {
-            "enum": ["log", "regularised"],
-            "default": "log",
+            "enum": Friction::ALL.map(Friction::name),
+            "default": Friction::default().name(),
             "description": "Form of the direct effect: a logarithm, or an inverse hyperbolic sine, which holds down to rest",
         },
         "units": {
@@ -92,7 +93,7 @@ fn own() -> Value {
         },
         "description": { "type": "string", "description": "Purpose of the sweep" },
         "model": keys("The model", model),
-        "accuracy": keys("Accuracy of the numbers", json!({ "rtol": rtol(Some(1e-10)) })),
+        "accuracy": keys("Accuracy of the numbers", json!({ "rtol": rtol(Some(AccuracySpec::default().rtol)) })),
         "tables": tables,
     })
 }
@@ -172,7 +173,7 @@ fn form(quantity: Quantity, units: &Units) -> Value {
         })
     };
     let range =
-        |how: &str| triple(2, (1 << 53) - 1, &format!("[first, last, count], evenly spaced{how}, both ends included"));
+        |how: &str| triple(2, MAX_COUNT, &format!("[first, last, count], evenly spaced{how}, both ends included"));
     let sample = |design: Design, kind: &str| {
         triple(1, design.most(), &format!("[least, greatest, count], a {kind}, joint over all such axes"))
     };
