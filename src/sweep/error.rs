@@ -27,7 +27,7 @@ pub struct SpecError {
 }
 
 /// Greatest number of faults in an error. Chosen: they fit a screen.
-pub const MAX_FAULTS: usize = 10;
+const MAX_FAULTS: usize = 10;
 
 /// Greatest length of a key or finding in a message, in characters. Chosen: more than the 1000 of the longest expression.
 const MAX_SHOWN_CHARS: usize = 1200;
@@ -86,9 +86,7 @@ impl SpecError {
         change(&mut self);
         self
     }
-}
 
-impl SpecError {
     /// Writes this fault alone.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.file, self.line) {

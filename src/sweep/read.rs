@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{MAX_FAULTS, SpecError, unknown};
+use super::error::{SpecError, unknown};
 use super::spec::Spec;
 use crate::grid::Quantity;
 
@@ -44,7 +44,7 @@ impl Spec {
             let fault = SpecError { line: Some(line_of(text, span.start)), ..fault(text, span, key, error.message()) };
             let faults = SpecError::and(known, fault);
             // Without the entry other faults show, at the same places.
-            if !entry.is_some_and(|entry| blank(&mut rest, entry)) || faults.others.len() + 1 == MAX_FAULTS {
+            if !entry.is_some_and(|entry| blank(&mut rest, entry)) || faults.is_full() {
                 return Err(Box::new((faults, None)));
             }
             known = Some(faults);
