@@ -151,14 +151,14 @@ impl Failure {
 
 impl From<SpecError> for Failure {
     fn from(error: SpecError) -> Failure {
-        Failure { code: EXIT_REQUEST, message: format!("error: {error}") }
+        wrong(error)
     }
 }
 
 #[cfg(feature = "query")]
 impl From<QueryError> for Failure {
     fn from(error: QueryError) -> Failure {
-        Failure { code: if error.is_wrong() { EXIT_REQUEST } else { EXIT_FAILURE }, message: format!("error: {error}") }
+        if error.is_wrong() { wrong(error) } else { Failure::failed(error) }
     }
 }
 
@@ -316,19 +316,23 @@ fn refused(found: impl Display, expected: impl Display, help: impl Display) -> F
     wrong(format!("{found}\n  expected: {expected}\n  help: {help}"))
 }
 
-/// Opens the dataset in `path`.
+/// Opens the dataset in `path`, where one of `kinds` is expected.
+fn opened(path: &Path, kinds: &[Kind]) -> Result<(Folder, Manifest), Failure> {
+    let folder = Folder::at(path);
+    let manifest = if path.is_dir() { folder.manifest().map_err(Failure::failed)? } else { None };
+    Ok((folder, manifest.ok_or_else(|| kind::unexpected(path, kinds))?))
+}
+
+/// Opens the dataset in `path`, and prints a note if its manifest was reconstructed.
 ///
 /// # Errors
 ///
 /// The failure that a command reports.
 pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
     kind::expect(path, &[Kind::Dataset])?;
-    let folder = Folder::at(path);
-    // It may have been removed in the meantime.
-    let manifest = folder.manifest().map_err(Failure::failed)?;
-    let manifest = manifest.ok_or_else(|| kind::unexpected(path, &[Kind::Dataset]))?;
+    let opened = opened(path, &[Kind::Dataset])?;
     note_rebuilt(path);
-    Ok((folder, manifest))
+    Ok(opened)
 }
 
 /// Prints a note if the manifest of the dataset in `path` was reconstructed from the parts.

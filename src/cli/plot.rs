@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::kind::{self, Kind};
 use super::watch::waiting;
-use super::{
-    EXIT_FAILURE, EXIT_REQUEST, Failure, cannot_write, dataset, is_stdout, put, refused, say, within, write_file, wrong,
-};
+use super::{EXIT_FAILURE, Failure, cannot_write, dataset, is_stdout, put, refused, say, within, write_file, wrong};
 use crate::plot::table::{Condition, Request, Source};
 use crate::plot::{self, COLUMN, Figure, Format, PAGE, PlotError, missing_letters};
 use crate::sweep::units_of;
@@ -58,8 +56,7 @@ pub struct Arguments {
 impl From<PlotError> for Failure {
     fn from(error: PlotError) -> Failure {
         // A damaged file is not an error of the arguments.
-        let code = if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { EXIT_FAILURE } else { EXIT_REQUEST };
-        Failure { code, message: format!("error: {error}") }
+        if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { Failure::failed(error) } else { wrong(error) }
     }
 }
 

@@ -11,8 +11,8 @@ use super::plan::too_large;
 use super::shards::quoted;
 use super::watch::{waiting, watched};
 use super::{
-    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, is_stdout, load, refused, say, summary, whole, words,
-    wrong,
+    EXIT_FAILURE, EXIT_NOT_CONVERGED, EXIT_TEMPFAIL, Failure, is_stdout, load, opened, refused, say, summary, whole,
+    words, wrong,
 };
 use crate::dataset::atomic::nearest_folder;
 use crate::dataset::{DatasetError, Folder};
@@ -189,16 +189,12 @@ fn subject(arguments: &Arguments) -> Result<(Sweep, Folder), Failure> {
         let folder = Folder::new(arguments.out.as_deref().unwrap_or(Path::new("results")), &sweep.name);
         return Ok((sweep, folder));
     }
-    let folder = Folder::at(path);
-    let found = folder.manifest().map_err(Failure::failed)?;
-    let Some(manifest) = found else {
-        return Err(kind::unexpected(path, &[PathKind::Spec, PathKind::Dataset]));
-    };
+    let (folder, manifest) = opened(path, &[PathKind::Spec, PathKind::Dataset])?;
     if manifest.spec.is_empty() {
         let message = "the manifest is missing, and the parts do not contain the spec";
         return Err(wrong(format!("{}: {message}\n  help: run the spec file of this dataset", path.display())));
     }
-    let sweep = Sweep::parse_at(&manifest.spec, &Folder::at(path).manifest_path()).map_err(|error| {
+    let sweep = Sweep::parse_at(&manifest.spec, &folder.manifest_path()).map_err(|error| {
         let what = format!("{}: its spec refers to files that are not in the dataset", path.display());
         wrong(format!("{what}\n  found: {}\n  help: run the spec file: {}", error.found, by_spec(path, &manifest.name)))
     })?;
@@ -248,14 +244,13 @@ fn may_pass(error: &RunError) -> bool {
 
 /// Whether a failure may be temporary: of a disk, a network or a server, but not of free space or permissions.
 fn is_passing(error: &io::Error) -> bool {
-    /// "Input/output error", for which `io::ErrorKind` has no variant.
-    const EIO: i32 = 5;
     use io::ErrorKind as Kind;
     let waits = [Kind::Interrupted, Kind::TimedOut, Kind::WouldBlock, Kind::ResourceBusy, Kind::StaleNetworkFileHandle];
     let network = [Kind::HostUnreachable, Kind::NetworkUnreachable, Kind::NetworkDown, Kind::NotConnected];
     let connection = [Kind::ConnectionReset, Kind::ConnectionAborted, Kind::ConnectionRefused];
     let kinds = waits.iter().chain(&network).chain(&connection);
-    error.raw_os_error() == Some(EIO) || kinds.into_iter().any(|kind| *kind == error.kind())
+    // "Input/output error", for which `io::ErrorKind` has no variant.
+    error.raw_os_error() == Some(libc::EIO) || kinds.into_iter().any(|kind| *kind == error.kind())
 }
 
 /// The work of the run, in words.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::kind::Kind;
 use super::run::by_spec;
 use super::shards::{quoted, scripts};
-use super::{EXIT_FAILURE, Failure, kind, say, summary, words};
+use super::{EXIT_FAILURE, Failure, opened, say, summary, words};
 use crate::dataset::{Build, CheckDepth, Folder, Foreign, Manifest, Survey, TableSurvey};
 use crate::sweep::{Plan, Sweep, shards_with};
 
@@ -33,13 +33,7 @@ const MAX_LISTED: usize = 10;
 /// A path that is not a dataset, or damaged parts.
 pub fn status(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.dataset;
-    if !path.is_dir() {
-        return Err(kind::unexpected(path, &[Kind::Dataset]));
-    }
-    let folder = Folder::at(path);
-    let Some(manifest) = folder.manifest().map_err(Failure::failed)? else {
-        return Err(kind::unexpected(path, &[Kind::Dataset]));
-    };
+    let (folder, manifest) = opened(path, &[Kind::Dataset])?;
     let survey =
         summary::survey(&folder, &manifest, if arguments.check { CheckDepth::Whole } else { CheckDepth::Footer });
     let mut text = format!("{}: {}, made by slipsweep {}\n", path.display(), manifest.name, manifest.build.version);

@@ -8,9 +8,7 @@ mod row;
 use std::path::Path;
 
 use super::kind::{self, Kind};
-use super::{
-    EXIT_FAILURE, EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, whole, words, write_file, wrong,
-};
+use super::{EXIT_REQUEST, Failure, dataset, no_table, put, refused, say, whole, words, write_file, wrong};
 use crate::grid::Quantity;
 use crate::model::{Friction, StateLaw, Units};
 use crate::protocol::shortcut::Case;
@@ -190,13 +188,16 @@ impl Arguments {
 
     /// The failure for a protocol that does not exist.
     fn absent(&self, request: &TraceRequest, absence: &Absence) -> Failure {
-        let code = if absence.is_defect() { EXIT_FAILURE } else { EXIT_REQUEST };
-        let Some(Origin { table, row, .. }) = &request.origin else {
-            return Failure { code, message: format!("error: no `{}` protocol: {absence}", request.name) };
+        let message = match &request.origin {
+            Some(origin) => self.of_row(origin, &first_line(&absence.text(&request.units))),
+            None => format!("no `{}` protocol: {absence}", request.name),
         };
-        let reason = first_line(&absence.text(&request.units));
-        let help = "choose a row whose status is ok";
-        Failure { code, message: format!("error: {}: row {row} of `{table}`: {reason}\n  help: {help}", self.subject) }
+        if absence.is_defect() { Failure::failed(message) } else { wrong(message) }
+    }
+
+    /// The message that the row of `origin` has no protocol.
+    fn of_row(&self, Origin { table, row, .. }: &Origin, reason: &str) -> String {
+        format!("{}: row {row} of `{table}`: {reason}\n  help: choose a row whose status is ok", self.subject)
     }
 
     /// The protocol, its trace, and the effects of a disturbance if one is requested.
@@ -209,12 +210,9 @@ impl Arguments {
         };
         let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
-            if let Some(Origin { table, row, .. }) =
-                request.origin.as_ref().filter(|origin| origin.status == Some(Status::Infeasible))
-            {
+            if let Some(origin) = request.origin.as_ref().filter(|origin| origin.status == Some(Status::Infeasible)) {
                 let reason = "its status is infeasible: the response diverges, or its optimum does not exist";
-                let help = "choose a row whose status is ok";
-                return Err(wrong(format!("{}: row {row} of `{table}`: {reason}\n  help: {help}", self.subject)));
+                return Err(wrong(self.of_row(origin, reason)));
             }
             let trace = of(&*path.motion)?;
             return Ok((path, trace, None));
