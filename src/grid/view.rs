@@ -46,7 +46,10 @@ impl<'a> View<'a> {
 
     fn segments(&self, rows: Range<u64>) -> impl Iterator<Item = Segment> + '_ {
         let first = self.segments.partition_point(|segment| segment.end() <= rows.start);
-        self.segments[first..].iter().map(move |segment| segment.cut(&rows)).take_while(|segment| !segment.raw.is_empty())
+        self.segments[first..]
+            .iter()
+            .map(move |segment| segment.cut(&rows))
+            .take_while(|segment| !segment.raw.is_empty())
     }
 
     /// The values at `row`, one of the rows.
@@ -62,9 +65,6 @@ impl<'a> View<'a> {
             }
             let made = block.derived.iter().map(|derived| derived.quantity);
             let made: Vec<Quantity> = made.filter(|quantity| block_rows.determines(*quantity)).collect();
-            if made.is_empty() {
-                return point;
-            }
             let mut scratch = Scratch::default();
             Sampler::new(block, &block_rows.digits, &made, None).pick(&[segment.raw.start], &mut scratch);
             for quantity in made {

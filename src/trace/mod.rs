@@ -7,10 +7,11 @@ mod row;
 mod sample;
 mod write;
 
+use crate::grid::Grid;
 use crate::model::{Transition, Units};
 use crate::numerics::elementary::ln;
 use crate::protocol::{Moment, Motion};
-use crate::table::{Column, Kind};
+use crate::table::Column;
 
 pub use disturbed::{Disturbance, Rest};
 pub use protocol::{
@@ -122,23 +123,14 @@ impl Trace {
 
     /// The value of a column, given by its index in [`COLUMNS`], at a moment; `None` if it does not exist.
     pub fn value(moment: &Moment, column: usize) -> Option<f64> {
-        match column {
-            0 => Some(moment.t),
-            1 => Some(moment.v),
-            2 => Some(moment.theta),
-            3 => Some(moment.friction),
-            4 => moment.v_c,
-            _ => moment.beta,
-        }
+        let Moment { t, v, theta, friction, v_c, beta } = *moment;
+        [Some(t), Some(v), Some(theta), Some(friction), v_c, beta][column]
     }
 }
 
 /// The scaled unit of a column, given by its index in [`COLUMNS`].
 pub fn unit(column: usize) -> &'static str {
-    match COLUMNS[column].kind {
-        Kind::Number(unit) => unit,
-        _ => "",
-    }
+    COLUMNS[column].unit(&Grid::default())
 }
 
 /// The steady states before the start and after the end: theta is continuous, the velocity may jump.
