@@ -9,7 +9,7 @@ use crate::dataset::{Folder, TableSurvey};
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
 use crate::protocol::Status;
-use crate::sweep::{Sweep, estimate, units_of};
+use crate::sweep::{Spec, Sweep, estimate, units};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -40,12 +40,12 @@ pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     keep_datasets(&path)?;
     let mut page = Page::new(&format!("Dataset {}", manifest.name));
     // The description by the user comes first.
-    let spec: Option<toml::Table> = manifest.spec.parse().ok();
-    if let Some(description) = spec.as_ref().and_then(|spec| spec.get("description")?.as_str()) {
-        page.words(description);
+    let spec = Spec::parse(&manifest.spec)?;
+    if !spec.description.is_empty() {
+        page.words(&spec.description);
     }
     page.words(&format!("Made by slipsweep {}.", manifest.build.version));
-    let units = units_of(&manifest.spec)?;
+    let units = units(&spec.model)?;
     let tables = summary::contents(&folder, &manifest)?.tables;
 
     pictures(&mut page, Source::new(folder, manifest.clone(), units))?;
