@@ -188,8 +188,7 @@ impl RowIndex {
                     count *= distinct;
                 }
             }
-            let run = digits.first().map_or(block_rows.digits.rows, |fastest| fastest.digit.stride);
-            parts.push(BlockTuples { digits, first: span, run });
+            parts.push(BlockTuples { digits, first: span });
             span += count;
         }
         Tuples { parts, span }
@@ -225,11 +224,10 @@ struct TupleDigit {
 /// The tuples of one block.
 #[derive(Debug, Clone)]
 struct BlockTuples {
+    /// Fastest first.
     digits: Vec<TupleDigit>,
     /// Tuples of the blocks before.
     first: u64,
-    /// The length of a run of equal tuples, in product rows, from a multiple of this number.
-    run: u64,
 }
 
 /// A numbering of the different tuples of some quantities among the rows of a table. A tuple of a block has one number in every row index of the
@@ -253,6 +251,7 @@ impl Tuples {
             let step = digit.step(raw);
             weight * class_of.as_ref().map_or(step, |class_of| u64::from(class_of[step as usize]))
         });
-        (part.first + number.sum::<u64>(), (raw / part.run + 1).saturating_mul(part.run))
+        let next = part.digits.first().map_or(u64::MAX, |fastest| fastest.digit.next(raw));
+        (part.first + number.sum::<u64>(), next)
     }
 }
