@@ -1,7 +1,6 @@
 //! A dataset on disk: its tables, pictures, summary and audit.
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicU64;
 
 use arrow_array::RecordBatch;
 use arrow_select::concat::concat_batches;
@@ -108,7 +107,7 @@ impl Dataset {
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
         let (folder, manifest) = (self.folder.clone(), self.manifest.clone());
         let work = move || {
-            let survey = Survey::new(&folder, &manifest, CheckDepth::Footer, &AtomicU64::new(0));
+            let survey = Survey::new(&folder, &manifest, CheckDepth::Footer);
             let tables = survey.tables.iter().map(|table| text::summary(&table.name, table.rows, &table.statistics));
             tables.collect::<Vec<_>>().join("\n")
         };

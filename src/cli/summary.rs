@@ -1,7 +1,6 @@
 //! `slipsweep summary DATASET`: the summary that `run` prints at its end, from the footers of the parts.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicU64;
 
 use super::trace::reason;
 use super::watch::waiting;
@@ -52,7 +51,7 @@ pub fn survey(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey 
         CheckDepth::Footer => "reading the footers",
         CheckDepth::Whole => "checking existing parts",
     };
-    waiting(doing, || Survey::new(folder, manifest, look, &AtomicU64::new(0)))
+    waiting(doing, || Survey::new(folder, manifest, look))
 }
 
 /// The contents of a dataset without damaged parts.

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
@@ -67,9 +66,8 @@ impl TableSurvey {
 }
 
 impl Survey {
-    /// Surveys the dataset of `manifest` in `folder`: inspects every part to the depth `look`, on all processors; `looked` counts the inspected
-    /// parts.
-    pub fn new(folder: &Folder, manifest: &Manifest, look: CheckDepth, looked: &AtomicU64) -> Survey {
+    /// Surveys the dataset of `manifest` in `folder`: inspects every part to the depth `look`, on all processors.
+    pub fn new(folder: &Folder, manifest: &Manifest, look: CheckDepth) -> Survey {
         // Without further threads, this one does all the work.
         let pool = rayon::ThreadPoolBuilder::new().build().ok();
         let tables = manifest.tables.iter().map(|table| {
@@ -82,11 +80,7 @@ impl Survey {
             let mut next = 0;
             let there = folder.parts_there(table);
             let states = there.chunks(PARTS_PER_MERGE).flat_map(|parts| {
-                let look = |part: &u64| {
-                    let state = folder.state(manifest, &table.name, *part, look);
-                    looked.fetch_add(1, Ordering::Relaxed);
-                    (*part, state)
-                };
+                let look = |part: &u64| (*part, folder.state(manifest, &table.name, *part, look));
                 match &pool {
                     Some(pool) => pool.install(|| parts.par_iter().with_max_len(1).map(look).collect::<Vec<_>>()),
                     None => parts.iter().map(look).collect(),

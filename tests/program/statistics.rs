@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::AtomicU64;
 
 use slipsweep::dataset::{Cell, CheckDepth, Folder, Row, Survey, TableStatistics, frame};
 use slipsweep::grid::Point;
@@ -126,7 +125,7 @@ fn compare(name: &str, statistics: &TableStatistics, rows: &[Row]) {
 
 fn survey(out: &Path, sweep: &slipsweep::sweep::Sweep) -> Survey {
     let manifest = Plan::new(sweep).manifest(sweep);
-    Survey::new(&Folder::new(out, &sweep.name), &manifest, CheckDepth::Footer, &AtomicU64::new(0))
+    Survey::new(&Folder::new(out, &sweep.name), &manifest, CheckDepth::Footer)
 }
 
 #[test]
