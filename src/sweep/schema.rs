@@ -132,7 +132,7 @@ fn axis(quantity: Quantity, units: &Units) -> Value {
         let one = json!({ "enum": words });
         return json!({ "description": quantity.doc(), "anyOf": [one, list(&one)] });
     }
-    let mut one = Value::Object(legal(quantity, units));
+    let mut one = legal(quantity, units);
     if quantity.domain().contains(f64::INFINITY) {
         // JSON has no infinity: readers of TOML make null of `inf`, which nothing else in TOML becomes.
         one["type"] = json!(["number", "null"]);
@@ -144,19 +144,15 @@ fn axis(quantity: Quantity, units: &Units) -> Value {
 }
 
 /// The schema of a number of `quantity`; without its range in SI units, since the schema does not know the scales.
-fn legal(quantity: Quantity, units: &Units) -> Map<String, Value> {
-    match units {
-        Units::Scaled => number(&quantity.domain()),
-        Units::Si(_) => [("type".to_owned(), json!("number"))].into_iter().collect(),
-    }
+fn legal(quantity: Quantity, units: &Units) -> Value {
+    if *units == Units::Scaled { number(&quantity.domain()) } else { json!({ "type": "number" }) }
 }
 
 /// The schema of a number in this range; from 0 on if 0 is an isolated value, which would need two ranges.
-fn number(domain: &Domain) -> Map<String, Value> {
+fn number(domain: &Domain) -> Value {
     let least = if domain.apart == Some(0.0) { 0.0 } else { domain.least };
     let lower = if domain.least_excluded { "exclusiveMinimum" } else { "minimum" };
-    let bounds = [("type", json!("number")), (lower, json!(least)), ("maximum", json!(domain.greatest))];
-    bounds.map(|(key, value)| (key.to_owned(), value)).into_iter().collect()
+    json!({ "type": "number", lower: least, "maximum": domain.greatest })
 }
 
 /// A range, with its unit.
@@ -222,7 +218,9 @@ fn table_of(table: &Table) -> Value {
 /// An accuracy, with its default if it has one of its own.
 fn rtol(default: Option<f64>) -> Value {
     let mut rtol = number(&RTOL);
-    rtol.insert("description".to_owned(), json!(format!("Relative accuracy of the numbers, {RTOL}")));
-    rtol.extend(default.map(|default| ("default".to_owned(), json!(default))));
-    Value::Object(rtol)
+    rtol["description"] = json!(format!("Relative accuracy of the numbers, {RTOL}"));
+    if let Some(default) = default {
+        rtol["default"] = json!(default);
+    }
+    rtol
 }
