@@ -139,7 +139,7 @@ impl Block {
 
     /// The names of the labels of rows over `quantities`: those of the factors with these axes.
     pub fn labels(&self, quantities: &[Quantity]) -> impl Iterator<Item = &str> {
-        let factors = self.factors_of(&self.roots(quantities)).into_iter();
+        let factors = self.factors_of(quantities).into_iter();
         factors.flat_map(|factor| &self.factors[factor].labels).map(|label| label.name.as_str())
     }
 
@@ -167,9 +167,10 @@ impl Block {
         roots
     }
 
-    /// The numbers of the factors that contain an axis of `roots`, slowest first.
-    pub fn factors_of(&self, roots: &[Quantity]) -> Vec<usize> {
-        (0..self.factors.len()).filter(|&factor| self.factors[factor].holds_any(roots)).collect()
+    /// The numbers of the factors on which `quantities` depend, slowest first.
+    pub fn factors_of(&self, quantities: &[Quantity]) -> Vec<usize> {
+        let roots = self.roots(quantities);
+        (0..self.factors.len()).filter(|&factor| self.factors[factor].holds_any(&roots)).collect()
     }
 }
 

@@ -39,7 +39,7 @@ struct Level {
 impl RowFilter {
     /// The filter of rows over `digits` of `block`: a row is kept if the condition holds at any of its points. `None` beyond [`MAX_COMBINATIONS`].
     pub fn new(block: &Block, digits: &Digits, condition: &Expression) -> Option<RowFilter> {
-        let reads = block.factors_of(&block.roots(&condition.reads()));
+        let reads = block.factors_of(&condition.reads());
         let (mut levels, mut factors) = (vec![Level { read: 1, free: 1 }], Vec::new());
         for digit in &digits.digits {
             let is_read = reads.contains(&digit.factor);
@@ -190,7 +190,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     let mut reads = vec![quantity];
     reads.extend(block.condition.iter().flat_map(Expression::reads));
     let roots = block.roots(&reads);
-    let digits = Digits::new(block, &block.factors_of(&roots)).filter(|digits| digits.rows <= MAX_COMBINATIONS)?;
+    let digits = Digits::new(block, &block.factors_of(&reads)).filter(|digits| digits.rows <= MAX_COMBINATIONS)?;
     let sampler = Sampler::new(block, &digits, &[quantity], block.condition.as_ref());
     let search = |rows: Range<u64>, scratch: &mut Scratch| {
         batches(rows).find_map(|rows| {

@@ -62,8 +62,7 @@ impl Grid {
         let mut blocks = Vec::new();
         let (mut rows, mut raw): (u64, u64) = (0, 0);
         for (number, block) in self.blocks.iter().enumerate() {
-            let factors = block.factors_of(&block.roots(quantities));
-            let digits = Digits::new(block, &factors).ok_or(TooMany::Rows)?;
+            let digits = Digits::new(block, &block.factors_of(quantities)).ok_or(TooMany::Rows)?;
             raw = raw.checked_add(digits.rows).ok_or(TooMany::Rows)?;
             let row_filter = match &block.condition {
                 Some(condition) => {
