@@ -211,33 +211,30 @@ impl Runs {
     pub fn over(&self, rows: Range<u64>) -> impl Iterator<Item = (usize, usize)> + '_ {
         let mut row = rows.start;
         let mut step = if rows.is_empty() { 0 } else { self.step_of(row) };
-        // The first row of the next step of a factor axis.
-        let mut next = match &self.order {
+        let after = |starts: &[u64], step: usize| starts.get(step + 1).copied().unwrap_or(u64::MAX);
+        // The first row after the run.
+        let mut end = match &self.order {
             Order::Cyclic { digit, segment } => {
                 let raw = segment.raw.start + row.saturating_sub(segment.first);
                 row.saturating_add(digit.next(raw) - raw)
             }
-            Order::Listed(_) => 0,
+            Order::Listed(starts) => after(starts, step),
         };
         std::iter::from_fn(move || {
             if row >= rows.end {
                 return None;
             }
-            let here = step;
+            let run = (step, (end.min(rows.end) - row) as usize);
+            row = end;
             step += 1;
-            let end = match &self.order {
+            end = match &self.order {
                 Order::Cyclic { digit, .. } => {
                     step = if step as u64 == digit.len { 0 } else { step };
-                    let end = next;
-                    next = next.saturating_add(digit.stride);
-                    end
+                    end.saturating_add(digit.stride)
                 }
-                Order::Listed(starts) => starts.get(step).copied().unwrap_or(u64::MAX),
+                Order::Listed(starts) => after(starts, step),
             };
-            let end = end.min(rows.end);
-            let length = (end - row) as usize;
-            row = end;
-            Some((here, length))
+            Some(run)
         })
     }
 }
