@@ -25,7 +25,7 @@ impl Arguments {
         }
         let path = Path::new(&self.subject);
         let (folder, manifest) = dataset(path)?;
-        let Some(table) = manifest.tables.iter().find(|table| table.name == name) else {
+        let Some(table) = manifest.table(name) else {
             let names: Vec<&str> = manifest.tables.iter().map(|table| table.name.as_str()).collect();
             return Err(no_table(&format!("{}: ", path.display()), name, &names));
         };
