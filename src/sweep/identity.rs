@@ -85,16 +85,16 @@ impl Sweep {
         let [here, there] = [facts(self), facts(other)];
         let new = here.iter().filter(|fact| !there.contains(fact));
         let lost = there.iter().filter(|fact| !here.contains(fact));
+        let line = |key: &str| read::line(&self.text, key).map_or(String::new(), |line| format!(" (line {line})"));
         // An axis is more specific than the order of all axes.
         let keys = new.chain(lost).map(|(key, _)| key.as_str());
         let Some(key) = keys.min_by_key(|key| key.ends_with("axes")) else {
-            let line = read::line(&self.text, "points").map_or(String::new(), |line| format!(" (line {line})"));
-            return [format!("the file of points{line}"), "other contents of this file".to_owned()];
+            return [format!("the file of points{}", line("points")), "other contents of this file".to_owned()];
         };
         // The accuracy of a table is usually that of the sweep.
-        let own = key.strip_suffix(".rtol").filter(|_| read::value(&self.text, key).is_none());
+        let has = |key: &str| read::value(&self.text, key).is_some();
         let of_table = key;
-        let key = own.filter(|_| read::value(&self.text, RTOL).is_some()).map_or(key, |_| RTOL);
+        let key = if key.ends_with(".rtol") && !has(key) && has(RTOL) { RTOL } else { key };
         let value = |sweep: &Sweep, facts: &[(String, String)]| {
             let fact = facts.iter().find(|(known, _)| known == of_table && !key.contains("axes."));
             let fact = fact.map(|(_, value)| value.clone());
@@ -102,8 +102,7 @@ impl Sweep {
             value.map_or_else(|| format!("no {key}"), |value| format!("{key} = {}", shown(&value, MAX_SHOWN_CHARS)))
         };
         let [here, there] = [value(self, &here), value(other, &there)];
-        let line = read::line(&self.text, key).filter(|_| !here.starts_with("no "));
-        let line = line.map_or(String::new(), |line| format!(" (line {line})"));
+        let line = if here.starts_with("no ") { String::new() } else { line(key) };
         if here == there {
             return [format!("the values of {key}{line}"), format!("other values of {key}")];
         }
