@@ -67,16 +67,12 @@ pub fn record_batch(trace: &Trace, units: &Units) -> std::result::Result<RecordB
     let columns = trace.columns();
     let fields = columns.iter().map(|&place| {
         let column = &COLUMNS[place];
-        field(column.name, DataType::Float64, is_partial(place), units.name(unit(place)), column.doc)
+        // The costate has no value before and after the protocol.
+        field(column.name, DataType::Float64, column.name == "beta", units.name(unit(place)), column.doc)
     });
     let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let cells = |&column: &usize| -> ArrayRef {
         Arc::new(trace.moments.iter().map(|moment| Trace::value(moment, column)).collect::<Float64Array>())
     };
     RecordBatch::try_new(schema, columns.iter().map(cells).collect())
-}
-
-/// Whether the column with this index may lack a value: the costate before and after the protocol.
-fn is_partial(column: usize) -> bool {
-    column + 1 == COLUMNS.len()
 }
