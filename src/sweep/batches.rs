@@ -6,17 +6,16 @@ use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
 
 use super::check::{Request, Sweep};
-use super::plan::Plan;
-use crate::dataset::{Layout, ManifestTable, batch};
+use crate::dataset::{Layout, batch};
 use crate::table::{ColumnBuffer, OptimumCache, Signal};
 
 /// An iterator over the batches of a table. All threads compute the next batch on request.
 pub struct Batches<'a> {
     sweep: &'a Sweep,
     request: &'a Request,
-    table: ManifestTable,
     layout: Layout,
     optimum_cache: Arc<OptimumCache>,
+    /// The first row of the next batch.
     next: u64,
 }
 
@@ -24,17 +23,10 @@ impl Sweep {
     /// The rows of a table as Arrow record batches, with the columns, types, units and row order of the Parquet files of a run.
     /// `None` if the spec does not request this table.
     pub fn batches(&self, table: &str) -> Option<Batches<'_>> {
-        let plan = Plan::new(self);
-        let tables = self.requests.iter().zip(plan.tables).zip(self.optimum_cache());
-        let ((request, table), optimum_cache) = tables.into_iter().find(|((_, planned), _)| planned.name == table)?;
-        Some(Batches {
-            sweep: self,
-            request,
-            table,
-            layout: Layout::new(request.table, &request.projection, &self.grid),
-            optimum_cache,
-            next: 0,
-        })
+        let mut tables = self.requests.iter().zip(self.optimum_cache());
+        let (request, optimum_cache) = tables.find(|(request, _)| request.table.name() == table)?;
+        let layout = Layout::new(request.table, &request.projection, &self.grid);
+        Some(Batches { sweep: self, request, layout, optimum_cache, next: 0 })
     }
 }
 
@@ -49,11 +41,13 @@ impl Iterator for Batches<'_> {
     type Item = Result<RecordBatch, ArrowError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.next >= self.table.parts {
+        // A batch has the rows of a part.
+        let end = self.next.saturating_add(self.request.table.rows_per_part()).min(self.request.rows);
+        let rows = self.next..end;
+        self.next = end;
+        if rows.is_empty() {
             return None;
         }
-        let rows = self.table.rows_of(self.next);
-        self.next += 1;
         let signal = Signal::default();
         let job = self.sweep.job(self.request, &self.optimum_cache, &signal);
         let mut buffer = ColumnBuffer::new(self.request.projection.indices().len());
