@@ -181,7 +181,7 @@ impl Runs {
         &self.values
     }
 
-    /// The same runs with other values.
+    /// These runs with other values.
     pub fn map(mut self, value: impl Fn(f64) -> f64) -> Runs {
         self.values.iter_mut().for_each(|known| *known = value(*known));
         self

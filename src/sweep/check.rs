@@ -289,12 +289,11 @@ pub fn check_name(name: &str) -> Result<(), SpecError> {
         return Ok(());
     }
     let expected = format!("at most {MAX_NAME_BYTES} letters from a to z, digits, '-', '_' and '.', the first not '.'");
-    if name.is_empty() {
-        let help = "write it at the top, such as name = \"my_sweep\"; it names the folder of the dataset";
-        return refuse("name", "missing or empty", expected, help);
-    }
     refuse("name", format!("`{name}` cannot name a folder"), expected, "choose another name")
 }
+
+/// The help for a spec without a name.
+const HELP_FOR_NO_NAME: &str = "write it at the top, such as name = \"my_sweep\"; it names the folder of the dataset";
 
 /// The grid and the form of friction of `spec`, after the checks that do not depend on each other.
 fn independent(spec: &Spec, folder: &Path) -> Result<(Grid, Friction), SpecError> {
@@ -305,7 +304,11 @@ fn independent(spec: &Spec, folder: &Path) -> Result<(Grid, Friction), SpecError
         Ok(())
     });
     let form = laws::friction(&spec.model).map(|form| friction = form);
-    all([check_name(&spec.name), axes, check_rtol("accuracy.rtol", spec.accuracy.rtol), form, check_tables(spec)])?;
+    let name = check_name(&spec.name).map_err(|fault| match spec.name.as_str() {
+        "" => SpecError { found: "missing or empty".into(), help: HELP_FOR_NO_NAME.into(), ..fault },
+        _ => fault,
+    });
+    all([name, axes, check_rtol("accuracy.rtol", spec.accuracy.rtol), form, check_tables(spec)])?;
     Ok((Grid { blocks: grid.into_iter().map(Arc::new).collect(), units: known_units }, friction))
 }
 

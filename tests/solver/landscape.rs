@@ -425,7 +425,7 @@ fn effort_is_spent_on_feasible_points_alone() {
     }
     assert_eq!(total.quadratures, feasible);
     assert_eq!(feasible, 69446);
-    assert_eq!(total.nodes, 1_812_668);
+    assert_eq!(total.nodes, 1_795_792);
 }
 
 #[test]

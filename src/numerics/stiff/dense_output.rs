@@ -42,7 +42,7 @@ impl<const N: usize, const S: usize> DenseOutput<N, S> {
         dense_output
     }
 
-    /// The same polynomial as one of a degree `P` above `S`.
+    /// This polynomial as one of a degree `P` above `S`.
     #[inline(always)]
     pub fn raised<const P: usize>(&self) -> DenseOutput<N, P> {
         let &DenseOutput { t, h, start, end, powers } = self;
