@@ -33,7 +33,12 @@ fn make(n: usize) -> Rule {
         let mut node = DoubleDouble::new(libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)));
         for _ in 0..5 {
             let (p, slope) = legendre(n, node);
-            node = node - p / slope;
+            let step = p / slope;
+            node = node - step;
+            // The next step is its square.
+            if step.high.abs() < f64::EPSILON {
+                break;
+            }
         }
         let slope = legendre(n, node).1;
         let weight = DoubleDouble::new(2.0) / ((DoubleDouble::new(1.0) - node * node) * slope * slope);

@@ -233,7 +233,13 @@ fn powers(
         far[i] += gap[i];
     }
     for level in 1..=MAX_SQUARINGS {
-        if level > 1 && focal.iter().all(|&focal| focal >= cheap) {
+        // A larger power increases the distance from the centre, but hardly from other zeros.
+        let may_gain = |i: usize| {
+            (focal[i] < cheap)
+                & (powers.squarings[i] == f64::from(level - 1))
+                & (focal[i] - 2.0 > 2.0 * near[i] / (far[i] - near[i]))
+        };
+        if level > 1 && !(0..SPAN_SHORTCUTS).any(may_gain) {
             break;
         }
         for i in 0..SPAN_SHORTCUTS {
