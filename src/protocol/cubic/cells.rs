@@ -244,12 +244,11 @@ fn range(values: &[f64; SAMPLE_COUNT]) -> [f64; 2] {
 fn squared(places: &Places<SAMPLE_COUNT>, upper: bool, gap: f64, [near, far]: [f64; 2]) -> [f64; SAMPLE_COUNT] {
     let mut least = [f64::MAX; SAMPLE_COUNT];
     for k in 0..ZEROS {
-        for i in 0..SAMPLE_COUNT {
-            let (re, y) = (places.re[k][i], places.im[k][i]);
-            let x = gap + if upper { 1.0 - re } else { re };
+        for (least, (re, y)) in least.iter_mut().zip(places.re[k].iter().zip(&places.im[k])) {
+            let x = gap + if upper { 1.0 - re } else { *re };
             let size = if PAIRS.contains(&k) { (x * x + y * y).sqrt() } else { x.abs() };
             let (_, sum) = rooted(size, x, near, far);
-            least[i] = if sum < least[i] { sum } else { least[i] };
+            *least = if sum < *least { sum } else { *least };
         }
     }
     least.map(|square| 2.0 * square.sqrt() / (far - near))
