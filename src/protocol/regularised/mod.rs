@@ -143,8 +143,8 @@ fn is_doubtful(status: Status) -> bool {
     matches!(status, Status::Unproven | Status::NegativeFriction)
 }
 
-/// Requested over greatest relative error of the work of the pieces. Measured: with it the gaps of the random sample are good to `rtol` (`cargo test --release --test
-/// solver stress::regularised`).
+/// Requested over greatest relative error of the work of the pieces. Measured: with it the gaps of the random sample are good to `rtol`
+/// (`cargo test --release --test solver stress::regularised`).
 const SPARE_ACCURACY: f64 = 30.0;
 
 /// Sums and extremes along the protocol.
