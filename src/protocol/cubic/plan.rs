@@ -233,13 +233,16 @@ fn powers(
         far[i] += gap[i];
     }
     for level in 1..=MAX_SQUARINGS {
-        // A larger power increases the distance from the centre, but hardly from other zeros.
-        let may_gain = |i: usize| {
-            (focal[i] < cheap)
-                & (powers.squarings[i] == f64::from(level - 1))
-                & (focal[i] - 2.0 > 2.0 * near[i] / (far[i] - near[i]))
-        };
-        if level > 1 && !(0..SPAN_SHORTCUTS).any(may_gain) {
+        // Each shortcut decides for itself, whatever the others need. A square costs no more than a plain rule, but differences from a distant centre
+        // lose digits. A larger power increases the distance from the centre, but hardly from other zeros.
+        let open: [bool; SPAN_SHORTCUTS] = std::array::from_fn(|i| {
+            if level == 1 {
+                return gap[i] <= length[i];
+            }
+            let is_limited = focal[i] - 2.0 > 2.0 * near[i] / (far[i] - near[i]);
+            (focal[i] < cheap) & (powers.squarings[i] == f64::from(level - 1)) & is_limited
+        });
+        if open == [false; SPAN_SHORTCUTS] {
             break;
         }
         for i in 0..SPAN_SHORTCUTS {
@@ -256,9 +259,7 @@ fn powers(
         }
         for i in 0..SPAN_SHORTCUTS {
             let reached = 2.0 * least[i].sqrt() / (far[i] - near[i]);
-            // A square costs no more than a plain rule, but differences from a distant centre lose digits.
-            let open = if level == 1 { gap[i] <= length[i] } else { focal[i] < cheap };
-            let better = open & (reached > focal[i]);
+            let better = open[i] & (reached > focal[i]);
             focal[i] = if better { reached } else { focal[i] };
             powers.squarings[i] = if better { f64::from(level) } else { powers.squarings[i] };
             powers.from[i] = if better { near[i] } else { powers.from[i] };
