@@ -10,7 +10,7 @@ use crate::numerics::stiff::{Accuracy, Integrator, Linearised, Points, System, r
 use crate::numerics::{ROUNDING_RTOL, TIGHT_RTOL};
 use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::{Motion, SpringBlock};
-use crate::stability::{COARSENING, OpenLoopResult};
+use crate::stability::{CONFIRMATION_RATIO, OpenLoopResult};
 
 /// Samples of one simulation, at most. Chosen: each takes some steps; more would take minutes a row.
 const MAX_SAMPLES: u32 = 100_000;
@@ -49,7 +49,7 @@ pub fn held_error(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, dt: f6
     // Where errors grow, the shift of the control grows with them; steps may stay on an unstable motion by symmetry.
     let shift = (SHIFT * rtol).max(ROUNDING_RTOL);
     let number = distance(rtol, 1.0, shift).and_then(|shifted| {
-        let distance = distance(rtol / COARSENING, PARTS, 0.0)?;
+        let distance = distance(rtol / CONFIRMATION_RATIO, PARTS, 0.0)?;
         ((shifted - distance).abs() <= rtol * (1.0 + distance)).then_some(distance)
     });
     OpenLoopResult { number, steps }

@@ -12,9 +12,9 @@ pub use hopf::{Hopf, interpolated_lyapunov_coefficient, lyapunov_coefficient};
 pub use linear::{Eigenvalues, SteadySliding, critical_velocity};
 pub use sensitivity::amplification;
 
-/// Tolerance of the first of two runs that confirm a number, in units of that of the second. Chosen: their difference is the error of the first to a
+/// Tolerance of the first of two runs that confirm a number over that of the second. Chosen: their difference is the error of the first to a
 /// digit, and rounding differs with their steps.
-const COARSENING: f64 = 10.0;
+const CONFIRMATION_RATIO: f64 = 10.0;
 
 /// Result of following a protocol open loop.
 #[derive(Debug, Clone, Copy, PartialEq)]

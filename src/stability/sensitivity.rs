@@ -19,7 +19,7 @@ use crate::numerics::{LONG_ROUNDING_RTOL, MIN_INVERTIBLE, TIGHT_RTOL};
 use crate::protocol::compliant::{self, CompliantPath};
 use crate::protocol::error::TIGHTEST_RTOL;
 use crate::protocol::{Jet, SpringBlock};
-use crate::stability::{COARSENING, OpenLoopResult};
+use crate::stability::{CONFIRMATION_RATIO, OpenLoopResult};
 
 /// Amplification of a small error of the state from start to end of the shortcut from `v_i` to `v_f` in `t_f`: the largest singular value of the
 /// fundamental matrix.
@@ -31,7 +31,7 @@ pub fn amplification(slider: &SpringBlock, velocities: (f64, f64), t_f: f64, rto
     let mut steps = 0;
     let mut confirmed = || {
         let path = compliant::path(slider, velocities, t_f, (PATH_ACCURACY * rtol).max(TIGHT_RTOL)).ok()?;
-        let rough = growth(&path, COARSENING * TIGHTEST_RTOL, &mut steps)?;
+        let rough = growth(&path, CONFIRMATION_RATIO * TIGHTEST_RTOL, &mut steps)?;
         let fine = growth(&path, TIGHTEST_RTOL, &mut steps).filter(|growth| growth.is_finite())?;
         let agree = (rough - fine).abs() <= rtol * fine.max(LONG_ROUNDING_RTOL);
         agree.then_some(if fine < LONG_ROUNDING_RTOL { 0.0 } else { fine })

@@ -342,8 +342,16 @@ fn no_order_and_no_split_changes_a_bit() {
     }
     // Up to the border of feasibility, where plans of every kind are made.
     places.extend((1..40).map(|k| (0.02 * (1.0 - libm::pow(10.0, -0.4 * f64::from(k))), -0.3)));
-    for rtol in [1e-6, 1e-10, 1e-13] {
-        let landscape = Landscape::new(&PAPER, 0.02, rtol);
+    let others = [
+        (Transition { law: Law { a: 0.01, b: 0.3 }, v_i: 50.0, v_f: 2.0 }, 1.0),
+        (Transition { law: Law { a: 0.05, b: 0.02 }, v_i: 1.1, v_f: 1e6 }, 0.5),
+        (Transition { law: Law { a: 0.03, b: 0.05 }, v_i: 20.0, v_f: 21.0 }, 0.04),
+    ];
+    let landscapes = others.iter().map(|case| (*case, 1e-10));
+    for ((transition, t_f), rtol) in
+        [1e-6, 1e-10, 1e-13].map(|rtol| ((PAPER, 0.02), rtol)).into_iter().chain(landscapes)
+    {
+        let landscape = Landscape::new(&transition, t_f, rtol);
         let run = |places: &[(f64, f64)]| {
             let (a_2, a_3): (Vec<f64>, Vec<f64>) = places.iter().copied().unzip();
             let (mut work, mut v_min) = (vec![0.0; places.len()], vec![0.0; places.len()]);
@@ -357,14 +365,15 @@ fn no_order_and_no_split_changes_a_bit() {
             (bits(work), bits(v_min), status)
         };
         let whole = run(&places);
-        assert!(whole.2.iter().filter(|&&status| status != Status::Infeasible).count() > 1500);
+        let feasible = whole.2.iter().filter(|&&status| status != Status::Infeasible).count();
+        assert!(feasible > 1000, "{feasible} for {transition:?}");
         // A stride that meets all places once, in a very different order and in pieces of odd lengths.
         let order: Vec<usize> = (0..places.len()).map(|i| i * 1009 % places.len()).collect();
         for piece in order.chunks(37) {
             let (work, v_min, status) = run(&piece.iter().map(|&i| places[i]).collect::<Vec<_>>());
             for (k, &i) in piece.iter().enumerate() {
                 let found = (work[k], v_min[k], status[k]);
-                assert_eq!(found, (whole.0[i], whole.1[i], whole.2[i]), "{:?} at {rtol}", places[i]);
+                assert_eq!(found, (whole.0[i], whole.1[i], whole.2[i]), "{:?} of {transition:?} at {rtol}", places[i]);
             }
         }
     }

@@ -24,8 +24,8 @@ pub(super) const MAX_STEPS: u32 = 100_000;
 /// Chosen: the errors of the thirty-odd steps of a slip add up.
 pub(super) const STEP_ERROR: f64 = 0.03;
 
-/// Error of `ln(v/v_f)` at an extremum of the dense output, absolute and relative, at most. Measured at the loosest tolerance.
-pub(super) const DENSE_OUTPUT_ERROR: f64 = 1e-2;
+/// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
+const DENSE_OUTPUT_ERROR: f64 = 1e-2;
 
 /// Error estimate of a step, fraction of the motion, at most. Chosen: an estimate as large as the motion allows steps that
 /// damp a growing motion.

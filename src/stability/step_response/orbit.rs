@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use super::integration::{Integration, IntegrationStep, step_to, substep};
-use super::long_term::DENSE_OUTPUT_ERROR;
 use super::scaled_block::{ScaledBlock, State, X, Y, Z};
 use crate::numerics::root::crossing;
 use crate::numerics::stiff::radau_iia_9;
@@ -60,6 +59,10 @@ pub const BAND: [f64; 2] = [-0.01005033585350144, 0.009950330853168083];
 /// Half width of the windows of both refinements of an extremum, fraction of a step. Chosen: the error of the dense
 /// output, of order 5, is smaller at every tolerance.
 const POLISH_WINDOW: f64 = 0.125;
+
+/// Distance of an extremum from the edge of the band of settled velocities, relative to the edge, below which it is refined. Chosen: the error of the
+/// dense output is smaller.
+const NEAR_EDGE: f64 = 0.01;
 
 /// Integration of a response, with its cycles.
 #[derive(Debug)]
@@ -204,7 +207,7 @@ impl<'a> Orbit<'a> {
         let side = usize::from(slope > 0.0);
         let (edge, sign) = (BAND[side], [-1.0, 1.0][side]);
         let beyond = seen.rough.x / edge - 1.0;
-        if beyond.abs() < DENSE_OUTPUT_ERROR {
+        if beyond.abs() < NEAR_EDGE {
             let refined = self.refined(seen).x / edge - 1.0;
             let is_ambiguous = refined.abs() * edge.abs() < self.x_error || refined * beyond <= 0.0;
             if is_ambiguous || beyond > 0.0 {
