@@ -9,11 +9,10 @@ use multiversion::multiversion;
 use slipsweep::numerics::elementary::{exp, ln};
 use slipsweep::numerics::turning::turning_lanes;
 
-/// Numbers between 0 and 1 from a fixed linear congruence.
-pub fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-    (*state >> 11) as f64 / (1_u64 << 53) as f64
-}
+#[path = "../../tests/support/mod.rs"]
+mod tests;
+
+pub use tests::uniform;
 
 /// Numbers between 0 and 1 by xorshift.
 pub fn xorshift() -> impl FnMut() -> f64 {

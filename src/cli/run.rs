@@ -291,7 +291,7 @@ fn next_commands(sweep: &Sweep, path: &Path) -> String {
     let mut text = format!("next:\n  slipsweep head {path}\n  slipsweep plot {path}\n");
     // A build without SQL does not suggest it.
     if let Some(request) = sweep.requests.first().filter(|_| cfg!(feature = "query")) {
-        let sql = format!("SELECT * FROM {} WHERE status = 'ok' LIMIT 10", request.table.name());
+        let sql = format!("SELECT status, count(*) FROM {} GROUP BY status", request.table.name());
         text.push_str(&format!("  slipsweep query {path} \"{sql}\"\n"));
     }
     text

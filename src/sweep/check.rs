@@ -250,7 +250,7 @@ fn unused(spec: &Spec, grid: &Grid, requests: &[Request]) -> Vec<SpecError> {
             let names = |tables: &[&Table]| tables.iter().map(|table| table.name()).collect::<Vec<_>>().join(", ");
             let others: Vec<&Table> = table::ALL.into_iter().filter(|table| has(table)).collect();
             let (expected, help) = if is_used {
-                ("numbers under the ceiling", "read these tables as those without the ceiling".to_owned())
+                ("numbers under the ceiling", "these tables ignore it; their protocols may exceed it".to_owned())
             } else {
                 let help = format!("remove it, or add a table that has it: {}", names(&others));
                 ("an axis of a requested table", help)

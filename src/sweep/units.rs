@@ -92,7 +92,7 @@ pub fn help(units: &Units, quantity: Quantity, value: f64) -> &'static str {
     match units {
         Units::Si(_) if is_velocity && units.scaled("v_0", value) > 1.0 => PROBABLY_SCALED,
         Units::Si(_) if is_velocity => {
-            "with `units = \"si\"`, velocities are in m/s; choose one above v_0, or lower v_0"
+            "with `units = \"si\"`, velocities are in m/s; choose one above v_0, or lower v_0 and add (a - b) ln(new v_0/old v_0) to mu_0"
         }
         Units::Scaled if is_velocity && value <= 1.0 => {
             "velocities are in units of v_0, above 1; for m/s, add `units = \"si\"` and the scales to [model]"

@@ -125,8 +125,8 @@ fn doubtful_axes_and_scales() {
     let mixed = "name = \"mixed\"\n[axes]\nt_f = 0.02\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = 100.0\nv_ceiling = 300.0\n[tables.optimal]\n\
                  [tables.crossover]\n";
     fs::write(folder.path().join("mixed.toml"), mixed).expect("is writable");
-    let warning = "warning: mixed.toml:8: axes.v_ceiling: no effect on crossover\n  expected: numbers under the ceiling\n  help: read these \
-                   tables as those without the ceiling\n";
+    let warning = "warning: mixed.toml:8: axes.v_ceiling: no effect on crossover\n  expected: numbers under the ceiling\n  help: these tables \
+                   ignore it; their protocols may exceed it\n";
     assert_eq!(String::from_utf8_lossy(&slipsweep(&["plan", "mixed.toml"], folder.path()).stderr), warning);
 }
 

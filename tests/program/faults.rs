@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::common::{files, run, sweep, write_batch};
+use crate::support::Random;
 use slipsweep::dataset::{CheckDepth, Folder, Foreign, State};
 use slipsweep::sweep::{Plan, Sweep};
 
@@ -19,15 +20,6 @@ fn slipsweep(folder: &Path) -> Command {
 
 fn said(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-}
-
-/// Numbers that look random, the same in every run.
-fn numbers() -> impl FnMut(usize) -> usize {
-    let mut state = 20_u64;
-    move |below| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) as usize % below
-    }
 }
 
 /// A file recomputed: writing over it would wait for the disk.
@@ -49,12 +41,12 @@ fn a_flipped_bit_is_found_wherever_it_is() {
     let good = fs::read(&path).expect("is there");
     let sound = part_of(&sweep, folder.path(), CheckDepth::Whole);
     assert!(matches!(&sound, State::There { statistics } if statistics.status[0] == 30), "{sound:?}");
-    let mut next = numbers();
+    let mut random = Random(20);
     // The last bytes are the checksum, the schema, and what Parquet ends with.
-    let random = (0..1000).map(|_| next(good.len())).collect::<Vec<_>>();
-    for byte in random.into_iter().chain(good.len().saturating_sub(200)..good.len()) {
+    let inside = (0..1000).map(|_| random.below(good.len())).collect::<Vec<_>>();
+    for byte in inside.into_iter().chain(good.len().saturating_sub(200)..good.len()) {
         let mut bad = good.clone();
-        bad[byte] ^= 1 << next(8);
+        bad[byte] ^= 1 << random.below(8);
         rewrite(&path, &bad);
         let state = part_of(&sweep, folder.path(), CheckDepth::Whole);
         assert!(matches!(state, State::Damaged { .. }), "byte {byte} of {}: {state:?}", good.len());
@@ -85,7 +77,7 @@ fn damaged_points_are_read_or_refused() {
     let folder = tempfile::tempdir().expect("is writable");
     let path = folder.path().join("points.parquet");
     let spec = "name = \"points\"\npoints = \"points.parquet\"\n[tables.optimal]\n";
-    let mut next = numbers();
+    let mut random = Random(20);
     let read = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("is writable");
         Sweep::parse(spec, folder.path()).err().map(|error| error.to_string())
@@ -100,9 +92,9 @@ fn damaged_points_are_read_or_refused() {
         }
         for _ in 0..300 {
             let mut bad = good.clone();
-            let (at, length) = (next(good.len()), 1 << next(6));
+            let (at, length) = (random.below(good.len()), 1 << random.below(6));
             for byte in bad.iter_mut().skip(at).take(length) {
-                *byte = if length == 1 { *byte ^ 1 << next(8) } else { next(256) as u8 };
+                *byte = if length == 1 { *byte ^ 1 << random.below(8) } else { random.below(256) as u8 };
             }
             if let Some(reported) = read(&bad) {
                 assert!(reported.len() < 4096, "{}: {reported}", sample.display());

@@ -6,21 +6,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::common::{files, numbers, read, run, words};
+use crate::support::Random;
 use slipsweep::grid::{Axis, Block, Derived, Expression, Factor, Grid, Quantity, RowIndex, Scale, Values};
 use slipsweep::sweep::{Plan, SpecError, Sweep};
 use slipsweep::table::OPTIMUM_AXES;
-
-/// A reproducible sequence (Steele, Lea and Flood's SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % end as u64) as usize
-    }
-}
 
 /// The axes that random blocks are made of; words and their default lists are left to other tests.
 const AXES: [Quantity; 7] = [

@@ -27,5 +27,7 @@ mod report;
 mod schema;
 mod shards;
 mod statistics;
+#[path = "../support/mod.rs"]
+mod support;
 mod trace_command;
 mod verify;

@@ -1,6 +1,7 @@
 //! The landscape of cubic shortcuts against quadrature by repeated halving, which knows nothing of zeros or maps.
 
 use crate::judge;
+use crate::support::Random;
 use slipsweep::model::{Law, Transition};
 use slipsweep::numerics::gauss::rule;
 use slipsweep::protocol::cubic::{Landscape, LandscapeBuffers};
@@ -137,26 +138,6 @@ fn line(landscape: &Landscape, a_2: f64, a_3: &[f64]) -> (Vec<f64>, Vec<f64>, Ve
     (work, v_min, status, stats)
 }
 
-/// Numbers between 0 and 1, the same everywhere (xorshift64).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn power(&mut self, low: f64, high: f64) -> f64 {
-        libm::pow(10.0, self.between(low, high))
-    }
-}
-
 #[test]
 fn paper_landscape_keeps_every_accuracy_at_every_feasible_point() {
     let a_3 = axis(401);
@@ -212,15 +193,15 @@ fn many_materials_keep_their_accuracy_up_to_the_border() {
     let mut random = Random(88172645463325252);
     let mut checked = 0;
     while checked < 2000 {
-        let a = random.power(-4.0, -0.52);
-        let law = Law { a, b: a * random.between(0.0, 10.0) };
-        let transition = Transition { law, v_i: 1.0 + random.power(-3.0, 6.0), v_f: 1.0 + random.power(-3.0, 6.0) };
-        let t_f = random.power(-9.0, 3.0);
+        let a = random.between(1e-4, 0.3);
+        let law = Law { a, b: 10.0 * a * random.next() };
+        let transition = Transition { law, v_i: 1.0 + random.between(1e-3, 1e6), v_f: 1.0 + random.between(1e-3, 1e6) };
+        let t_f = random.between(1e-9, 1e3);
         // n is a positive quadratic of known mean, so its ends are at most 9 times that.
         let rise = (transition.v_i - transition.v_f) / (transition.v_i * transition.v_f);
         let mean = t_f - rise;
         let mut place = |most: f64| {
-            let (start, end) = (most * random.unit() * random.unit(), most * random.unit() * random.unit());
+            let (start, end) = (most * random.next() * random.next(), most * random.next() * random.next());
             let a_2 = t_f - mean * start;
             (a_2, mean * end - t_f - 2.0 * a_2 + 3.0 * rise)
         };
@@ -241,7 +222,7 @@ fn many_materials_keep_their_accuracy_up_to_the_border() {
             let middle = 0.5 * (low + high);
             if feasible(middle) { low = middle } else { high = middle }
         }
-        let shortcut = between(low * (1.0 - random.power(-5.0, 0.0)));
+        let shortcut = between(low * (1.0 - random.between(1e-5, 1.0)));
         let [reference, size] = shortcut.work();
         for (rtol, landscape) in ACCURACIES.into_iter().zip(&landscapes) {
             let error = (shortcut.found(landscape).work - reference).abs() / size;
@@ -376,6 +357,36 @@ fn no_order_and_no_split_changes_a_bit() {
             }
         }
     }
+}
+
+/// Plans are made for many shortcuts at once; a shortcut that needs a larger power than its neighbours must not change theirs.
+#[test]
+fn works_of_random_materials_do_not_depend_on_neighbours() {
+    let mut random = Random(1);
+    let mut feasible = 0;
+    for case in 0..2000 {
+        let law = Law { a: random.between(1e-3, 0.3), b: random.between(1e-3, 0.5) };
+        let transition = Transition { law, v_i: random.between(1.001, 1e6), v_f: random.between(1.001, 1e6) };
+        let (theta_0, theta_1) = (1.0 / transition.v_i, 1.0 / transition.v_f);
+        let t_f = random.between(1e-2, 1e6) / transition.v_i.max(transition.v_f);
+        let landscape = Landscape::new(&transition, t_f, [1e-6, 1e-10, 1e-13][case % 3]);
+        let size = t_f + theta_0.max(theta_1);
+        let axis = || (0..12).map(|i| 2.0 * f64::from(i) / 11.0 - 1.0);
+        let places =
+            axis().flat_map(|q| axis().map(move |p| (3.0 * p * size + theta_1 - theta_0, 2.1 * (q - p) * size)));
+        let (a_2, a_3): (Vec<f64>, Vec<f64>) = places.unzip();
+        let works = |a_2: &[f64], a_3: &[f64]| {
+            let (mut work, mut status) = (vec![0.0; a_2.len()], vec![Status::NotConverged; a_2.len()]);
+            landscape.evaluate(a_2, a_3, LandscapeBuffers { work: &mut work, v_min: &mut [], status: &mut status });
+            work.into_iter().zip(status).map(|(work, status)| (work.to_bits(), status)).collect::<Vec<_>>()
+        };
+        let all = works(&a_2, &a_3);
+        for i in (0..all.len()).filter(|&i| all[i].1 != Status::Infeasible) {
+            feasible += 1;
+            assert_eq!(works(&a_2[i..=i], &a_3[i..=i])[0], all[i], "{transition:?}, {t_f}, {}, {}", a_2[i], a_3[i]);
+        }
+    }
+    assert!(feasible > 20_000, "{feasible}");
 }
 
 /// On lines of as many points as are settled together most least velocities are searched for span by span.

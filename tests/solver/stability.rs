@@ -1,18 +1,9 @@
 //! Linear stability: the eigenvalues against the characteristic equation with 32 digits.
 
+use crate::support::Random;
 use slipsweep::model::Law;
 use slipsweep::numerics::double_double::DoubleDouble;
 use slipsweep::stability::{Eigenvalues, SteadySliding};
-
-/// Numbers between 0 and 1 from a fixed linear congruence.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-    (*state >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-fn log_uniform(state: &mut u64, least: f64, greatest: f64) -> f64 {
-    least * (greatest / least).powf(uniform(state))
-}
 
 /// `(x^3 M + (M + a) x^2 + c x + k)` and the sum of the sizes of its terms at a complex `x`, in double-double.
 fn residual(law: Law, k: f64, m: f64, v: f64, (re, im): (f64, f64)) -> f64 {
@@ -33,12 +24,12 @@ fn scaled(eigenvalues: &Eigenvalues, v: f64) -> [(f64, f64); 2] {
 
 #[test]
 fn roots_solve_the_characteristic_equation() {
-    let mut state = 1;
+    let mut random = Random(1);
     for _ in 0..200_000 {
-        let a = log_uniform(&mut state, 1e-4, 0.3);
-        let law = Law { a, b: 10.0 * a * uniform(&mut state) };
-        let (k, v) = (log_uniform(&mut state, 1e-6, 1e3), log_uniform(&mut state, 1.001, 1e9));
-        let m = log_uniform(&mut state, 1e-20, 1e3);
+        let a = random.between(1e-4, 0.3);
+        let law = Law { a, b: 10.0 * a * random.next() };
+        let (k, v) = (random.between(1e-6, 1e3), random.between(1.001, 1e9));
+        let m = random.between(1e-20, 1e3);
         let sliding = SteadySliding::new(law, k, m, v);
         let eigenvalues = sliding.eigenvalues().expect("is elastic");
         for root in scaled(&eigenvalues, v) {

@@ -24,4 +24,9 @@ impl Random {
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.next())
     }
+
+    /// A whole number from 0 to `end - 1`.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.next() * end as f64) as usize
+    }
 }
