@@ -110,7 +110,7 @@ const OWN_DRAWING: TablePicture =
 const TABLE_PICTURES: [TablePicture; 13] = [
     TablePicture {
         table: "gap",
-        title: "Work gap of the cubic shortcuts",
+        title: "Landscape of cubic shortcuts",
         x: &["alpha_2", "alpha_3", "t_f"],
         y: &["alpha_3"],
         value: &["gap", "work"],
@@ -137,7 +137,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "feedback",
-        title: "Optimal velocity by state and time left",
+        title: "Optimal feedback by state and time left",
         x: &["theta", "t_left", "v_ceiling", "tau_ceiling", "v_f", "b", "a"],
         y: &["t_left", "v_ceiling", "tau_ceiling", "v_f"],
         classes: &["arc"],
@@ -148,7 +148,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "crossover",
-        title: "Durations at which the optimal strategy changes",
+        title: "Changes of the optimal strategy",
         x: &["v_f", "v_i", "b", "a"],
         y: &["v_i", "b", "a"],
         value: &["t_cross", "t_floor", "t_cheapest", "t_turn", "t_min"],
@@ -206,7 +206,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "gap_min",
-        title: "Least work gap of the cubic shortcuts",
+        title: "Best shortcut of a landscape",
         value: &["gap"],
         lines: &["gap", "alpha_2", "alpha_3", "v_min"],
         ..PROTOCOL_DEFAULTS
