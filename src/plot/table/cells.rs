@@ -14,7 +14,7 @@ pub struct AxisCells {
     pub even: bool,
     /// Whether each value has a cell of its own.
     pub exact: bool,
-    /// The least value of each cell; empty if the values are too many to keep, and cells are equal intervals.
+    /// The least value of each cell.
     firsts: Vec<f64>,
 }
 
@@ -24,10 +24,6 @@ impl AxisCells {
         let values = &axis.values;
         let (low, high) = (values[0], values[values.len() - 1]);
         let span = Scale { low, high, log: is_logarithmic(values) };
-        if axis.many {
-            let middles = (0..most).map(|cell| span.value((cell as f64 + 0.5) / most as f64)).collect();
-            return AxisCells { middles, scale: span, even: true, exact: false, firsts: Vec::new() };
-        }
         let last = values.len() - 1;
         if last == 0 {
             let scale = span.with_room(0.0);
@@ -77,12 +73,7 @@ impl AxisCells {
         if self.exact {
             return self.middles.binary_search_by(|middle| middle.total_cmp(&(value + 0.0))).ok();
         }
-        if !self.firsts.is_empty() {
-            return self.firsts.partition_point(|first| first.total_cmp(&(value + 0.0)).is_le()).checked_sub(1);
-        }
-        let fraction = self.scale.fraction(value);
-        let place = (fraction * self.len() as f64).floor();
-        (-1e-12..=1.0 + 1e-12).contains(&fraction).then(|| (place.max(0.0) as usize).min(self.len() - 1))
+        self.firsts.partition_point(|first| first.total_cmp(&(value + 0.0)).is_le()).checked_sub(1)
     }
 
     /// The value at a fraction between the centres of two cells, counted in cells.

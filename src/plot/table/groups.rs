@@ -195,8 +195,9 @@ impl Groups {
         }
         let all = found.len();
         let is_labelled = found.iter().any(|group| !group.label.is_empty());
-        // The axes that labels stand for.
-        let is_of_point = |axis: &usize| is_labelled && filtered.is_of_point(axes[*axis]);
+        // The axes that labels stand for, and the labels themselves.
+        let is_of_point =
+            |axis: &usize| is_labelled && (filtered.is_of_point(axes[*axis]) || filtered.is_label(axes[*axis]));
         let of_points: Vec<usize> = (0..axes.len()).filter(is_of_point).collect();
         let different = varying(&values_of(&found));
         let words = |group: &FoundGroup, of: &[usize], has_label: bool| -> Vec<String> {

@@ -28,7 +28,7 @@ pub struct LineColumns {
     pub x: String,
     /// Columns of the panels, from the top.
     pub y: Vec<String>,
-    /// The axis that distinguishes lines first, or the label that distinguishes dots.
+    /// The axis or label that distinguishes lines first, or dots.
     pub series: Option<String>,
     /// Whether rows are dots with a symbol for each value of `series`.
     pub has_symbols: bool,
@@ -140,7 +140,10 @@ impl Rows {
         let makes = if plan.has_symbols { GroupRole::Symbols } else { GroupRole::Lines };
         let (mut further, along) = groups::further(filtered, &over, makes)?;
         let are_scattered = plan.has_symbols || groups::is_scattered(filtered, &plan.x, &further)?;
-        further.extend(of_symbols);
+        // A label distinguishes lines also where the axes of its points do not. Scattered points have names instead.
+        further.extend(
+            series.filter(|name| plan.has_symbols || !are_scattered && filtered.label_columns().contains(name)),
+        );
         further.sort_by_key(|name| Some(*name) != series);
         let first = further.first().copied().filter(|name| Some(*name) == series);
         let drawn: Vec<&str> = plan.y.iter().map(String::as_str).collect();

@@ -96,8 +96,7 @@ fn edges() -> Vec<(f64, f64)> {
 
 /// Bands of the quantiles of the gap over an axis; for a single landscape, the fraction of its shortcuts over the gap.
 pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
-    let has =
-        |name: &str, least: usize| filtered.axis(name).is_some_and(|axis| axis.many || axis.values.len() >= least);
+    let has = |name: &str, least: usize| filtered.axis(name).is_some_and(|axis| axis.values.len() >= least);
     let across = [3, 2].into_iter().find_map(|least| PROTOCOL_DEFAULTS.x.iter().find(|name| has(name, least)));
     let columns: Vec<(&str, f64)> = QUANTILES.into_iter().filter(|(name, _)| filtered.has(name)).collect();
     match across {
