@@ -58,20 +58,12 @@ pub struct Column {
 ///
 /// # Errors
 ///
-/// A file that is not a trace.
+/// A file that cannot be read.
 pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     let shown = path.display().to_string();
     let stem = path.file_stem().map_or_else(|| shown.clone(), |stem| stem.to_string_lossy().into_owned());
     let is_csv = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     let (columns, facts) = if is_csv { csv(path, &shown)? } else { parquet(path)? };
-    let missing = ["t", "v"].into_iter().find(|name| !columns.iter().any(|column| column.name == *name));
-    if let Some(missing) = missing {
-        let found = columns.into_iter().map(|column| column.name).collect::<Vec<_>>().join(", ");
-        return Err(PlotError::Refused(format!(
-            "{shown}: not a trace: it has no column `{missing}`\n  found: {found}\n  help: `slipsweep trace … --out FILE` writes traces; \
-             of a dataset, name the folder"
-        )));
-    }
     Ok(TraceFile::new(columns, &facts, stem))
 }
 
@@ -146,7 +138,7 @@ fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts.into_iter().filter_map(fact).collect()))
 }
 
-/// The columns of a CSV, and its comments `# key = value`. Without a comment on units, those of a trace of slipsweep are scaled, and others unknown.
+/// The columns of a CSV, and its comments `# key = value`.
 fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let text = file::open(path)
         .and_then(std::io::read_to_string)
@@ -156,15 +148,12 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
         .filter_map(|line| line.trim_start_matches('#').split_once('='))
         .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
         .collect();
-    let fact = |name: &str| facts.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str());
-    let (units, is_ours) = (fact("units").unwrap_or_default(), fact("protocol").is_some());
+    let units = facts.iter().find(|(key, _)| key == "units").map_or("", |(_, value)| value);
     let units: Vec<&str> = units.split(", ").collect();
     let mut lines = text.lines().enumerate().skip_while(|(_, line)| line.starts_with('#'));
     let names = lines.next().map_or("", |(_, line)| line);
     let column = |(place, name): (usize, &str)| {
-        let unit = units.get(place).copied().filter(|known| !known.is_empty());
-        let scaled = || COLUMNS.iter().position(|column| is_ours && column.name == name).map_or("", trace::unit);
-        let unit = unit.unwrap_or_else(scaled);
+        let unit = units.get(place).copied().unwrap_or_default();
         Column { name: name.to_owned(), unit: unit.to_owned(), cells: Vec::new() }
     };
     let mut columns: Vec<Column> = names.split(',').map(str::trim).enumerate().map(column).collect();
