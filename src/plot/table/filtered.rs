@@ -157,9 +157,7 @@ impl FilteredTable {
                     condition.column
                 )));
             }
-            let columns = table::find(name).map_or(&[][..], |table| table.columns());
-            let kind = columns.iter().find(|column| column.name == condition.column).map(|column| column.kind);
-            if let Some(Kind::Label(words)) = kind
+            if let Some(Kind::Label(words)) = filtered.kind(&condition.column)
                 && let Some(word) = condition.values.iter().find(|word| !words.contains(&word.as_str()))
             {
                 let found = format!("--where {}: `{}` is never `{word}`", condition.shown(), condition.column);
@@ -184,12 +182,9 @@ impl FilteredTable {
 
     /// The labels and their words, except labels with too many words for a picture.
     fn read_labels(&self) -> Result<Vec<(String, Vec<String>)>, PlotError> {
-        let known = table::find(&self.table);
-        let is_column =
-            |name: &str| known.is_some_and(|table| table.columns().iter().any(|column| column.name == name));
         let is_label = |heading: &&Heading| {
             let name = heading.name.as_str();
-            !heading.is_number && Quantity::from_name(name).is_none() && !is_column(name) && name != STATUS
+            !heading.is_number && Quantity::from_name(name).is_none() && self.kind(name).is_none() && name != STATUS
         };
         let names: Vec<String> = self.headings.iter().filter(is_label).map(|heading| heading.name.clone()).collect();
         let mut labels: Vec<(String, Vec<String>)> = names.into_iter().map(|name| (name, Vec::new())).collect();
@@ -338,6 +333,12 @@ impl FilteredTable {
         self.axes.iter().find(|axis| axis.name == name)
     }
 
+    /// The kind of a column of the definition of the table.
+    fn kind(&self, column: &str) -> Option<Kind> {
+        let columns = table::find(&self.table)?.columns();
+        columns.iter().find(|known| known.name == column).map(|known| known.kind)
+    }
+
     /// The possible words of a column, in the order of their indices.
     pub fn words(&self, column: &str) -> Vec<String> {
         let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
@@ -347,8 +348,7 @@ impl FilteredTable {
         if let Some((_, word)) = self.common_labels.iter().find(|(name, _)| name == column) {
             return vec![word.clone()];
         }
-        let known = table::find(&self.table).map_or(&[][..], |table| table.columns());
-        match known.iter().find(|known| known.name == column).map(|known| known.kind) {
+        match self.kind(column) {
             Some(Kind::Flag) => owned(&["false", "true"]),
             _ => owned(&table::vocabulary(&self.table, column)),
         }
