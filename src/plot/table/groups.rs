@@ -289,11 +289,27 @@ impl Groups {
     }
 
     /// The group with these values of the axes, if it is shown.
-    pub fn place(&self, values: &[f64]) -> Option<usize> {
+    fn place(&self, values: &[f64]) -> Option<usize> {
         let mut values = values.to_vec();
         self.makes.merge(&self.axes, &mut values);
         let is_same = |(own, value): (&f64, &f64)| own == value || own.is_nan() && value.is_nan();
         self.shown.iter().position(|group| group.values.iter().zip(&values).all(is_same))
+    }
+
+    /// Calls `visit` with the group and the cells of `columns` for each row of a shown group, as [`FilteredTable::each`].
+    pub fn each(
+        &self,
+        filtered: &FilteredTable,
+        columns: &[&str],
+        mut visit: impl FnMut(usize, &[f64]),
+    ) -> Result<(), PlotError> {
+        let all: Vec<&str> = self.axes.iter().map(String::as_str).chain(columns.iter().copied()).collect();
+        filtered.each(&all, |row| {
+            let (key, cells) = row.split_at(self.axes.len());
+            if let Some(group) = self.place(key) {
+                visit(group, cells);
+            }
+        })
     }
 
     /// A figure without panels, to which each group adds one; `aspect` applies to a single panel.

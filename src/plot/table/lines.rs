@@ -132,11 +132,8 @@ impl Rows {
         let axis = filtered.axis(&plan.x).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing)?;
         let series = plan.series.as_deref();
         let of_symbols = series.filter(|_| plan.has_symbols);
-        let over: Vec<&str> = [&plan.x]
-            .into_iter()
-            .map(String::as_str)
-            .chain(of_symbols.filter(|name| !filtered.is_label(name)))
-            .collect();
+        let of_axis = of_symbols.filter(|name| !filtered.is_label(name));
+        let over: Vec<&str> = [plan.x.as_str()].into_iter().chain(of_axis).collect();
         let makes = if plan.has_symbols { GroupRole::Symbols } else { GroupRole::Lines };
         let (mut further, along) = groups::further(filtered, &over, makes)?;
         let are_scattered = plan.has_symbols || groups::is_scattered(filtered, &plan.x, &further)?;
@@ -156,12 +153,9 @@ impl Rows {
         let ranges = vec![vec![(f64::NAN, f64::NAN); positions.len()]; plan.y.len()];
         let line = |_| Line { positions: positions.clone(), ranges: ranges.clone(), names: Vec::new() };
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
-        let columns = [&plan.x].into_iter().chain(&plan.y).chain(&groups.axes).map(String::as_str);
-        let columns: Vec<&str> = columns.chain(labels.iter().copied()).collect();
-        filtered.each(&columns, |row| {
-            let (values, rest) = row[1..].split_at(plan.y.len());
-            let (group, named) = rest.split_at(groups.axes.len());
-            let (Some(group), Some(mut place)) = (groups.place(group), cells.place(row[0])) else { return };
+        groups.each(filtered, &[&[plan.x.as_str()], &drawn[..], &labels].concat(), |group, row| {
+            let (values, named) = row[1..].split_at(plan.y.len());
+            let Some(mut place) = cells.place(row[0]) else { return };
             let line = &mut lines[group];
             if has_row_each {
                 place = line.positions.len();

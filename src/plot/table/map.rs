@@ -197,16 +197,10 @@ impl Raster {
         };
         let mut sheets: Vec<PanelCells> = groups.shown.iter().map(empty).collect();
         let labels = if self.are_dots { filtered.names_of_dots(Some(&plan.value))? } else { Vec::new() };
-        let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
-        let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
-        filtered.each(&wanted, |row| {
-            let &[x, y, found, status, ref rest @ ..] = row else { return };
-            let (key, named) = rest.split_at(axes.len());
-            let (Some(panel), Some(column), Some(line)) =
-                (groups.place(key), self.cells[0].place(x), self.cells[1].place(y))
-            else {
-                return;
-            };
+        let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &labels[..]].concat();
+        groups.each(filtered, &wanted, |panel, row| {
+            let &[x, y, found, status, ref named @ ..] = row else { return };
+            let (Some(column), Some(line)) = (self.cells[0].place(x), self.cells[1].place(y)) else { return };
             let sheet = &mut sheets[panel];
             let mut cell = line * columns + column;
             if self.are_dots {

@@ -45,16 +45,10 @@ fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
 pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
     let columns = columns(filtered);
     let groups = Groups::of_panels(filtered, &[], &[])?;
-    let wanted: Vec<&str> = columns.iter().copied().chain(groups.axes.iter().map(String::as_str)).collect();
     let mut counts = vec![vec![0.0; columns.len()]; groups.shown.len()];
-    filtered.each(&wanted, |row| {
-        let (classes, key) = row.split_at(columns.len());
-        let Some(group) = groups.place(key) else { return };
+    groups.each(filtered, &columns, |group, row| {
         // Rows of one group are added.
-        counts[group]
-            .iter_mut()
-            .zip(classes)
-            .for_each(|(all, count)| *all += if count.is_nan() { 0.0 } else { *count });
+        counts[group].iter_mut().zip(row).for_each(|(all, count)| *all += if count.is_nan() { 0.0 } else { *count });
     })?;
     let edges = edges();
     if columns.len() < edges.len() {
@@ -112,11 +106,10 @@ fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Res
     // For each group and column, the value at each position.
     let mut quantiles = vec![vec![vec![f64::NAN; cells.len()]; columns.len()]; groups.shown.len()];
     let names = columns.iter().map(|(name, _)| *name);
-    let wanted: Vec<&str> = [across].into_iter().chain(names).chain(groups.axes.iter().map(String::as_str)).collect();
-    filtered.each(&wanted, |row| {
-        let (found, key) = row[1..].split_at(columns.len());
-        let (Some(group), Some(place)) = (groups.place(key), cells.place(row[0])) else { return };
-        quantiles[group].iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
+    let wanted: Vec<&str> = [across].into_iter().chain(names).collect();
+    groups.each(filtered, &wanted, |group, row| {
+        let Some(place) = cells.place(row[0]) else { return };
+        quantiles[group].iter_mut().zip(&row[1..]).for_each(|(column, value)| column[place] = *value);
     })?;
     let all = quantiles.iter().flatten().flatten().copied();
     let y = Scale::of(all).ok_or(PlotError::Nothing)?.with_room(DOT_ROOM);
