@@ -199,7 +199,7 @@ impl Groups {
         let is_of_point =
             |axis: &usize| is_labelled && (filtered.is_of_point(axes[*axis]) || filtered.is_label(axes[*axis]));
         let of_points: Vec<usize> = (0..axes.len()).filter(is_of_point).collect();
-        let different = varying(&values_of(&found));
+        let different = varying(found.iter().map(|group| &group.values));
         let words = |group: &FoundGroup, of: &[usize], has_label: bool| -> Vec<String> {
             let label = Some(group.label.clone()).filter(|label| has_label && !label.is_empty());
             let of: Vec<usize> = of.iter().copied().filter(|axis| !is_of_point(axis)).collect();
@@ -211,8 +211,7 @@ impl Groups {
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
         let shown = choice(&joined(&found, &of_points), most, makes, series);
         let shown: Vec<&FoundGroup> = shown.into_iter().map(|place| &found[place]).collect();
-        let named: Vec<Vec<f64>> = shown.iter().map(|group| group.values.clone()).collect();
-        let named = varying(&named);
+        let named = varying(shown.iter().map(|group| &group.values));
         let same: Vec<usize> = different.iter().copied().filter(|axis| !named.contains(axis)).collect();
         let has_names = shown.iter().any(|group| group.label != shown[0].label);
         let name = |group: &FoundGroup, of: &[usize], has_label: bool| words(group, of, has_label).join(", ");
@@ -233,9 +232,9 @@ impl Groups {
             along: None,
         };
         if makes == GroupRole::Panels && !has_names {
-            let values = values_of(&found);
-            let free: Vec<usize> = varying(&values).into_iter().filter(|axis| !is_of_point(axis)).collect();
-            if groups.cross(filtered, &values, &free) {
+            let free = varying(found.iter().map(|group| &group.values));
+            let free: Vec<usize> = free.into_iter().filter(|axis| !is_of_point(axis)).collect();
+            if groups.cross(filtered, &found, &free) {
                 groups.held = words(&found[0], &free[..free.len() - 2], true);
             }
         }
@@ -245,18 +244,17 @@ impl Groups {
     }
 
     /// Crosses the last two of the axes numbered `varying`, at the first values of the others; whether they are independent.
-    fn cross(&mut self, filtered: &FilteredTable, found: &[Vec<f64>], varying: &[usize]) -> bool {
+    fn cross(&mut self, filtered: &FilteredTable, found: &[FoundGroup], varying: &[usize]) -> bool {
         let [.., first, second] = varying else { return false };
         let crossed = [*first, *second];
         let axis = |place: usize| filtered.axis(&self.axes[place]);
         let [Some(first), Some(second)] = crossed.map(axis) else { return false };
         let is_held = |axis: &usize| !crossed.contains(axis);
-        let found_here: Vec<&Vec<f64>> = found
-            .iter()
-            .filter(|group| (0..group.len()).filter(is_held).all(|axis| group[axis] == found[0][axis]))
-            .collect();
+        let held: Vec<usize> = (0..self.axes.len()).filter(is_held).collect();
+        let is_here = |group: &&FoundGroup| held.iter().all(|&axis| group.values[axis] == found[0].values[axis]);
+        let found_here: Vec<&FoundGroup> = found.iter().filter(is_here).collect();
         let values = |axis: usize| {
-            let mut values: Vec<f64> = found_here.iter().map(|group| group[axis]).collect();
+            let mut values: Vec<f64> = found_here.iter().map(|group| group.values[axis]).collect();
             values.sort_by(f64::total_cmp);
             values.dedup();
             values
@@ -277,14 +275,14 @@ impl Groups {
         let (rows, columns) =
             (some(&rows, side(rows.len(), columns.len())), some(&columns, side(columns.len(), rows.len())));
         let group = |(row, column): (f64, f64)| {
-            let mut values = found[0].clone();
+            let mut values = found[0].values.clone();
             (values[crossed[0]], values[crossed[1]]) = (row, column);
             Group { name: format!("{}, {}", first.text_of(row), second.text_of(column)), values }
         };
         self.shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
         let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.text_of(value)).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
-        self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
+        self.left_out = found.iter().filter(|group| self.place(&group.values).is_none()).count();
         true
     }
 
@@ -428,14 +426,10 @@ fn find(
     Ok(found)
 }
 
-fn values_of(found: &[FoundGroup]) -> Vec<Vec<f64>> {
-    found.iter().map(|group| group.values.clone()).collect()
-}
-
 /// The values of labelled groups with the axes numbered `of_points`, which advance together, as one: the first of them has the number of the label.
 fn joined(found: &[FoundGroup], of_points: &[usize]) -> Vec<Vec<f64>> {
     let mut labels: IndexSet<&str> = IndexSet::new();
-    let mut joined = values_of(found);
+    let mut joined: Vec<Vec<f64>> = found.iter().map(|group| group.values.clone()).collect();
     for (group, values) in found.iter().zip(&mut joined) {
         let number = labels.insert_full(&group.label).0;
         for (place, &axis) in of_points.iter().enumerate() {
@@ -458,15 +452,15 @@ fn in_words(filtered: &FilteredTable, axes: &[&str], of: &[usize], values: &[f64
 }
 
 /// The axes that vary between groups.
-fn varying(found: &[Vec<f64>]) -> Vec<usize> {
-    let axes = found.first().map_or(0, Vec::len);
-    (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
+fn varying<'a>(groups: impl Iterator<Item = &'a Vec<f64>> + Clone) -> Vec<usize> {
+    let Some(first) = groups.clone().next() else { return Vec::new() };
+    (0..first.len()).filter(|&axis| groups.clone().any(|group| group[axis] != first[axis])).collect()
 }
 
 /// The indices of the shown groups, at most `most`: merged lines with some of the others at the first values of further axes, or sets of groups that
 /// differ in one axis alone, `series` or the last one, and so are comparable.
 fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usize>) -> Vec<usize> {
-    let varying = varying(found);
+    let varying = varying(found.iter());
     let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
     let is_merged = |group: &Vec<f64>| makes == GroupRole::Lines && group.iter().any(|value| value.is_nan());
     if found.iter().any(is_merged) {
