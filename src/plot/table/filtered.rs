@@ -211,16 +211,12 @@ impl FilteredTable {
             return Ok(());
         }
         let is_common = self.determined(&self.label_columns(), &[])?;
-        let mut first = Vec::new();
-        self.each_while(&self.label_columns(), |row| {
-            first = row.to_vec();
-            false
-        })?;
-        for (place, (name, words)) in std::mem::take(&mut self.labels).into_iter().enumerate() {
-            if !is_common[place] {
-                self.labels.push((name, words));
-            } else if !first[place].is_nan() {
-                self.common_labels.push((name, words[first[place] as usize].clone()));
+        let (found, _) = self.values(&self.label_columns())?;
+        for ((label, found), is_common) in std::mem::take(&mut self.labels).into_iter().zip(found).zip(is_common) {
+            match found.values.as_slice() {
+                [word] if is_common => self.common_labels.push((label.0, label.1[*word as usize].clone())),
+                [] => {}
+                _ => self.labels.push(label),
             }
         }
         let varying = self.axes.iter().filter(|axis| axis.varies() && !self.labels.is_empty());
@@ -341,17 +337,17 @@ impl FilteredTable {
 
     /// The possible words of a column, in the order of their indices.
     pub fn words(&self, column: &str) -> Vec<String> {
-        let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
         if let Some((_, words)) = self.labels.iter().find(|(name, _)| name == column) {
             return words.clone();
         }
         if let Some((_, word)) = self.common_labels.iter().find(|(name, _)| name == column) {
             return vec![word.clone()];
         }
-        match self.kind(column) {
-            Some(Kind::Flag) => owned(&["false", "true"]),
-            _ => owned(&table::vocabulary(&self.table, column)),
-        }
+        let words = match self.kind(column) {
+            Some(Kind::Flag) => vec!["false", "true"],
+            _ => table::vocabulary(&self.table, column),
+        };
+        words.into_iter().map(str::to_owned).collect()
     }
 
     /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`FilteredTable::words`]; NaN

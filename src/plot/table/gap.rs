@@ -5,14 +5,12 @@ use super::filtered::FilteredTable;
 use super::groups::Groups;
 use super::map::{self, MapFigure};
 use super::{Source, TableScene};
-use crate::grid::Quantity;
 use crate::model::Units;
 use crate::numerics::cubic::Cubic;
 use crate::plot::PlotError;
 use crate::plot::canvas::Stroke;
 use crate::plot::contour::contour;
 use crate::plot::figure::{Entry, Key, Layer};
-use crate::table::OPTIMUM_AXES;
 
 /// The axes of the landscape.
 const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
@@ -105,8 +103,7 @@ fn best(scene: &TableScene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)
     if !ALPHAS.iter().all(|alpha| filtered.has(alpha)) {
         return Ok(found);
     }
-    let mut axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
-    axes.extend([Quantity::Law.name(), Quantity::VelocityCeiling.name()].iter().filter(|axis| filtered.has(axis)));
+    let axes: Vec<&str> = filtered.axes.iter().map(|axis| axis.name.as_str()).collect();
     let values: Vec<Option<Vec<f64>>> =
         (0..found.len()).map(|group| axes.iter().map(|axis| scene.value(groups, group, axis)).collect()).collect();
     let columns: Vec<&str> = axes.iter().copied().chain(ALPHAS).collect();

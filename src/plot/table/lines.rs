@@ -43,8 +43,6 @@ pub struct LineFigure {
     pub groups: Groups,
     /// For each line, the first line with which it coincides; only that one is drawn.
     pub leaders: Vec<usize>,
-    /// The range of the horizontal axis.
-    pub x: Scale,
 }
 
 /// The rows of a table along the horizontal axis, by group.
@@ -117,7 +115,7 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     figure.legend = rows.legend(&drawn, &leaders);
     figure.notes.extend(notes);
     figure.panels = drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect();
-    Ok(LineFigure { figure, groups: rows.groups, leaders, x })
+    Ok(LineFigure { figure, groups: rows.groups, leaders })
 }
 
 /// Whether a panel shows the gaps of families, which have a logarithmic scale: gaps of steps that do not reach the final state are negative, the

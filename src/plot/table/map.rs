@@ -14,9 +14,8 @@ use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::STATUS;
 
-/// Greatest number of cells along an axis of a single panel, and of one of several panels. Chosen: finer cells are invisible in print.
+/// Greatest number of cells along an axis of a single panel, and two thirds of it of one of several. Chosen: finer cells are invisible in print.
 const MAX_CELLS: usize = 720;
-const MAX_CELLS_OF_SEVERAL: usize = 480;
 
 /// Filled fraction below which a map is sparse. Chosen: half of the fraction that a condition such as `v_f > v_i` leaves of a grid.
 const SPARSE_FILL: f64 = 0.25;
@@ -165,7 +164,7 @@ impl Raster {
     fn new(filtered: &FilteredTable, plan: &MapColumns, groups: &Groups) -> Result<Raster, PlotError> {
         let axis = |name| filtered.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
         let axes = [axis(&plan.x)?, axis(&plan.y)?];
-        let most = if groups.shown.len() > 1 { MAX_CELLS_OF_SEVERAL } else { MAX_CELLS };
+        let most = if groups.shown.len() > 1 { 2 * MAX_CELLS / 3 } else { MAX_CELLS };
         // Scattered rows, such as those of a sampled design, are dots; if there are too many, several fall in one cell.
         let per_panel = filtered.rows as f64 / groups.all as f64;
         let is_sparse = SPARSE_FILL * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
