@@ -178,12 +178,8 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((columns, facts))
 }
 
-/// A curve of a panel: numbers of its trace and column, and its points.
-struct Curve {
-    trace: usize,
-    rank: usize,
-    points: Vec<(f64, f64)>,
-}
+/// The curves of a trace in a panel: that of the block, then that of the control.
+type Curves = Vec<Vec<(f64, f64)>>;
 
 /// The figure of traces, with a panel for each group of columns with values, or for the column `y`, over the column `x`, or over time.
 ///
@@ -218,11 +214,8 @@ pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure,
         let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
         let layers = has_bound.then_some(bound).into_iter().collect();
         let fewer = |points| if x == "t" { thinned(points) } else { spaced(points, [&x_axis.scale, &y.scale]) };
-        let of_course = |(trace, of): (usize, &TraceFile)| {
-            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(x, name).map(fewer)));
-            points.filter_map(|(rank, points)| Some(Curve { trace, rank, points: points? })).collect::<Vec<_>>()
-        };
-        let curves: Vec<Curve> = traces.iter().enumerate().flat_map(of_course).collect();
+        let curves_of = |of: &TraceFile| names.iter().filter_map(|name| of.points(x, name).map(fewer)).collect();
+        let curves: Vec<Curves> = traces.iter().map(curves_of).collect();
         panels.push((Panel { title: String::new(), x: x_axis, y, layers }, curves));
     }
     let leaders = leaders(traces.len(), &panels);
@@ -232,7 +225,7 @@ pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure,
         _ => "Protocols".to_owned(),
     };
     let subtitle = equations(&common, &unit_in(traces, "t"));
-    let has_control = panels.iter().any(|(_, curves)| curves.iter().any(|curve| curve.rank > 0));
+    let has_control = panels.iter().any(|(_, curves)| curves.iter().any(|of_trace| of_trace.len() > 1));
     let legend = legend(traces, &leaders, &common, has_control);
     let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, traces, &leaders));
     let panels: Vec<Panel> = panels.collect();
@@ -266,27 +259,27 @@ fn one_unit<'a>(traces: &[TraceFile], names: impl Iterator<Item = &'a str>) -> R
 }
 
 /// For each trace, the first trace with which it coincides in all panels.
-fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
+fn leaders(count: usize, panels: &[(Panel, Vec<Curves>)]) -> Vec<usize> {
     coincide::leaders(count, |one, other| {
         panels.iter().all(|(panel, curves)| {
-            let own = |trace: usize| curves.iter().filter(move |curve| curve.trace == trace);
             let fraction = |(x, y): &(f64, f64)| (panel.x.scale.fraction(*x), panel.y.scale.fraction(*y));
-            let fractions = |curve: &Curve| -> Vec<(f64, f64)> { curve.points.iter().map(fraction).collect() };
-            let is_same = |(one, other): (&Curve, &Curve)| {
-                one.rank == other.rank && coincide::anywhere(&fractions(one), &fractions(other))
-            };
-            own(one).count() == own(other).count() && own(one).zip(own(other)).all(is_same)
+            let [one, other] = [one, other].map(|trace| {
+                curves[trace].iter().map(|curve| curve.iter().map(fraction).collect()).collect::<Curves>()
+            });
+            one.len() == other.len() && one.iter().zip(&other).all(|(one, other)| coincide::anywhere(one, other))
         })
     })
 }
 
 /// The panel with the curves of the leading traces.
-fn draw(mut panel: Panel, curves: Vec<Curve>, traces: &[TraceFile], leaders: &[usize]) -> Panel {
-    for Curve { trace, rank, points } in curves.into_iter().filter(|curve| leaders[curve.trace] == curve.trace) {
-        let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
-        panel.layers.push(Layer::Line(points.clone(), stroke));
-        if traces[trace].is_marked() && rank == 0 {
-            panel.layers.push(Layer::marks(points, trace));
+fn draw(mut panel: Panel, curves: Vec<Curves>, traces: &[TraceFile], leaders: &[usize]) -> Panel {
+    for (trace, curves) in curves.into_iter().enumerate().filter(|(trace, _)| leaders[*trace] == *trace) {
+        for (rank, points) in curves.into_iter().enumerate() {
+            let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
+            panel.layers.push(Layer::Line(points.clone(), stroke));
+            if traces[trace].is_marked() && rank == 0 {
+                panel.layers.push(Layer::marks(points, trace));
+            }
         }
     }
     panel
