@@ -585,31 +585,21 @@ impl Panel {
                 Layer::Marks(marks) => {
                     taken.extend(marks.iter().filter_map(|(at, _)| self.inside(area, *at)).map(around))
                 }
-                Layer::Names(of_layer) => {
-                    names.extend(of_layer.iter().filter(|(at, _)| self.inside(area, *at).is_some()))
-                }
+                Layer::Names(of_layer) => names.extend(of_layer),
                 _ => {}
             }
         }
         let key = |((x, _), name): &((f64, f64), String)| (name.clone(), x.to_bits());
-        let places: HashSet<_> = names.iter().copied().map(key).collect();
+        let places: HashSet<_> = names.iter().map(|named| key(named)).collect();
         let mut undrawn = if places.len() > MAX_NAMES { HashSet::new() } else { places };
         for named in names {
-            if !undrawn.contains(&key(named)) {
-                continue;
-            }
             let (at, name) = named;
-            let (x, y) = self.place(area, *at);
+            let Some((x, y)) = self.inside(area, *at).filter(|_| undrawn.contains(&key(named))) else { continue };
             let wide = NOTE_SIZE * label::width(name);
             let around_mark =
                 [(x + 3.5, y), (x - 3.5 - wide, y), (x - 0.5 * wide, y - NOTE_SIZE), (x - 0.5 * wide, y + NOTE_SIZE)];
             let boxes = around_mark.map(|(x, y)| Area { x, y: y - 0.5 * NOTE_SIZE, width: wide, height: NOTE_SIZE });
-            let is_free = |place: &&Area| {
-                let is_within = place.x >= area.x && place.x + wide <= area.x + area.width && place.y >= area.y;
-                is_within
-                    && place.y + NOTE_SIZE <= area.y + area.height
-                    && !taken.iter().any(|other| place.meets(other))
-            };
+            let is_free = |place: &&Area| area.holds(place) && !taken.iter().any(|other| place.meets(other));
             let Some(place) = boxes.iter().find(is_free).copied() else { continue };
             canvas.text((place.x, place.y + 0.85 * NOTE_SIZE), name, &Text { colour: "#333", ..NOTE });
             taken.push(place);
