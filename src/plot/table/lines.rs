@@ -67,8 +67,8 @@ struct Line {
 struct Graph {
     panel: Panel,
     curves: Vec<Vec<(f64, f64)>>,
-    /// The only value of the column.
-    constant: Option<f64>,
+    /// The column as an equation, if it is constant.
+    constant: Option<String>,
     /// Whether values are below the logarithmic axis.
     is_cut: bool,
 }
@@ -110,7 +110,7 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     }
     let mut figure = Figure { columns: 1, ..rows.groups.figure(0.0) };
     figure.aspect = ASPECTS[usize::from(plan.y.len() > 1)];
-    let words = rows.groups.held.iter().cloned().chain(stated.iter().filter_map(Graph::equation));
+    let words = rows.groups.held.iter().cloned().chain(stated.into_iter().filter_map(|graph| graph.constant));
     figure.subtitle = words.collect::<Vec<_>>().join(", ");
     figure.legend = rows.legend(&drawn, &leaders);
     figure.notes.extend(notes);
@@ -186,10 +186,12 @@ impl Rows {
         let scale = if scale.low == 0.0 && scale.high == 0.0 { Scale { high: 1.0, ..scale } } else { scale };
         let axis = |column: &str, scale| Axis::new(column, &filtered.unit(column), scale);
         let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(MARK_ROOM[1])));
+        let (low, high) = range(self.values(panel));
+        let is_constant = high - low <= CONSTANT_RTOL * low.abs().max(high.abs());
         Some(Graph {
+            constant: is_constant.then(|| label::equation(&y.column, &label::number(low), &y.unit)),
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
             curves: self.lines.iter().map(|line| line.curve(panel)).collect(),
-            constant: constant(self.values(panel)),
             is_cut: !is_log && scale.log && self.values(panel).any(|value| value < scale.low),
         })
     }
@@ -269,18 +271,4 @@ impl Line {
         }
         points
     }
-}
-
-impl Graph {
-    /// The column as an equation, if it is constant.
-    fn equation(&self) -> Option<String> {
-        let Axis { column, unit, .. } = &self.panel.y;
-        Some(label::equation(column, &label::number(self.constant?), unit))
-    }
-}
-
-/// The common value, if all values are equal.
-fn constant(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (low, high) = range(values);
-    (high - low <= CONSTANT_RTOL * low.abs().max(high.abs())).then_some(low)
 }
