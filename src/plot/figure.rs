@@ -197,13 +197,13 @@ impl Hover {
 /// An entry of a legend.
 #[derive(Debug, Clone)]
 pub struct Entry {
-    /// The sample of a legend entry.
+    /// Its sample.
     pub key: Key,
     /// The text, in markup.
     pub text: String,
 }
 
-/// An entry of a legend.
+/// The sample of an entry of a legend.
 #[derive(Debug, Clone)]
 pub enum Key {
     /// A line.

@@ -157,8 +157,8 @@ impl<'a> Choice<'a> {
         // A map without a requested column shows one with numbers.
         let of_column = self.request.y.as_ref().map_or(String::new(), |y| format!(" --color {y}"));
         Err(PlotError::Refused(format!(
-            "--color {colour}: an axis of {count} values\n  expected: at most {MAX_SERIES}, each with a symbol\n  help: --x {x} --y {colour}{of_column} \
-             draws a map"
+            "--color {colour}: an axis of {count} values\n  expected: at most {MAX_SERIES}, each with a symbol\n  help: --x {x} \
+             --y {colour}{of_column} draws a map"
         )))
     }
 
