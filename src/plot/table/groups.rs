@@ -209,7 +209,7 @@ impl Groups {
         let (found, empty) = if found.is_empty() { (empty, found) } else { (found, empty) };
         let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
-        let shown = choice(&joined(&found, &of_points), most, makes, series);
+        let shown = choice(&joined(&found, &of_points), most, series);
         let shown: Vec<&FoundGroup> = shown.into_iter().map(|place| &found[place]).collect();
         let named = varying(shown.iter().map(|group| &group.values));
         let same: Vec<usize> = different.iter().copied().filter(|axis| !named.contains(axis)).collect();
@@ -457,29 +457,17 @@ fn varying<'a>(groups: impl Iterator<Item = &'a Vec<f64>> + Clone) -> Vec<usize>
     (0..first.len()).filter(|&axis| groups.clone().any(|group| group[axis] != first[axis])).collect()
 }
 
-/// The indices of the shown groups, at most `most`: merged lines with some of the others at the first values of further axes, or sets of groups that
-/// differ in one axis alone, `series` or the last one, and so are comparable.
-fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usize>) -> Vec<usize> {
+/// The indices of the shown groups, at most `most`: sets of groups that differ in one axis alone, `series` or the last one, and so are comparable. An
+/// axis that merged lines do not have separates no sets.
+fn choice(found: &[Vec<f64>], most: usize, series: Option<usize>) -> Vec<usize> {
     let varying = varying(found.iter());
     let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
-    let is_merged = |group: &Vec<f64>| makes == GroupRole::Lines && group.iter().any(|value| value.is_nan());
-    if found.iter().any(is_merged) {
-        let is_further = |axis: &&usize| Some(**axis) != fast && !found.iter().any(|group| group[**axis].is_nan());
-        let further: Vec<usize> = varying.iter().filter(is_further).copied().collect();
-        let is_first = |place: &usize| further.iter().all(|&axis| found[*place][axis] == found[0][axis]);
-        let (mut places, others): (Vec<usize>, Vec<usize>) =
-            (0..found.len()).filter(is_first).partition(|&place| is_merged(&found[place]));
-        places.truncate(most);
-        places.extend(chosen(others.len(), most - places.len()).into_iter().map(|place| others[place]));
-        places.sort_unstable();
-        return places;
-    }
-    let rest = |place: usize| -> Vec<u64> {
-        let axes = (0..found[place].len()).filter(|axis| Some(*axis) != fast);
-        axes.map(|axis| found[place][axis].to_bits()).collect()
-    };
+    let is_common = |axis: &usize| Some(*axis) != fast && found.iter().all(|group| !group[*axis].is_nan());
+    let common: Vec<usize> = varying.into_iter().filter(is_common).collect();
     let mut sets: IndexMap<Vec<u64>, Vec<usize>> = IndexMap::new();
-    (0..found.len()).for_each(|place| sets.entry(rest(place)).or_default().push(place));
+    for (place, group) in found.iter().enumerate() {
+        sets.entry(common.iter().map(|&axis| group[axis].to_bits()).collect()).or_default().push(place);
+    }
     if sets.values().all(|set| set.len() == 1) {
         // Axes that advance together.
         sets = IndexMap::from([(Vec::new(), (0..found.len()).collect())]);
@@ -533,8 +521,7 @@ mod tests {
         }
         let friction = [10.0, 20.0, 30.0].map(|v_f| [1.1, 1.2].map(|tau| vec![3.0, v_f, tau]));
         found.extend(friction.into_iter().flatten());
-        let shown: Vec<&Vec<f64>> =
-            choice(&found, 7, GroupRole::Lines, Some(0)).into_iter().map(|place| &found[place]).collect();
+        let shown: Vec<&Vec<f64>> = choice(&found, 7, Some(0)).into_iter().map(|place| &found[place]).collect();
         assert!(shown.len() == 4 && shown.iter().all(|group| group[1] == 10.0), "{shown:?}");
         assert_eq!(shown.iter().filter(|group| group[0] == 3.0).count(), 2);
     }
