@@ -246,15 +246,15 @@ impl Rows {
 
     fn legend(&self, graphs: &[Graph], leaders: &[usize]) -> Vec<Entry> {
         let series = self.series();
-        // Each name once, at its first line.
-        let firsts: Vec<usize> = (0..series.len()).filter(|&line| !series[..line].contains(&series[line])).collect();
-        let names: Vec<&str> = firsts.iter().map(|&line| self.groups.shown[line].name.as_str()).collect();
-        let is_drawn = |name: usize| (0..series.len()).any(|line| series[line] == name && leaders[line] == line);
-        let leader = |(name, &line)| if is_drawn(name) { name } else { series[leaders[line]] };
-        let leaders: Vec<usize> = firsts.iter().enumerate().map(leader).collect();
+        // Each name once, at its first line that is drawn, if there is one.
+        let mut lines: Vec<usize> = (0..series.len()).collect();
+        lines.sort_by_key(|&line| (series[line], leaders[line] != line));
+        lines.dedup_by_key(|line| series[*line]);
+        let names: Vec<&str> = lines.iter().map(|&line| self.groups.shown[line].name.as_str()).collect();
+        let leaders: Vec<usize> = lines.iter().map(|&line| series[leaders[line]]).collect();
         Entry::of_series(&names, &leaders, |place| match self.are_scattered {
             true => Key::Mark(Symbol::of_series(place)),
-            false => Key::series(place, graphs.iter().any(|graph| self.is_marked(&graph.curves[firsts[place]]))),
+            false => Key::series(place, graphs.iter().any(|graph| self.is_marked(&graph.curves[lines[place]]))),
         })
     }
 }
