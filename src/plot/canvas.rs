@@ -62,6 +62,14 @@ impl Area {
             && other.y < self.y + self.height
     }
 
+    /// Whether another area is within this one.
+    pub fn holds(&self, other: &Area) -> bool {
+        other.x >= self.x
+            && other.x + other.width <= self.x + self.width
+            && other.y >= self.y
+            && other.y + other.height <= self.y + self.height
+    }
+
     fn attributes(&self) -> String {
         let Area { x, y, width, height } = self;
         format!("x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"", at(*x), at(*y), at(*width), at(*height))

@@ -71,9 +71,7 @@ fn tree(svg: &str) -> Result<usvg::Tree, PlotError> {
     for font in FONTS {
         fonts.load_font_data(font.to_vec());
     }
-    fonts.set_sans_serif_family("Arimo");
-    let options =
-        usvg::Options { font_family: "Arimo".to_owned(), fontdb: Arc::new(fonts), ..usvg::Options::default() };
+    let options = usvg::Options { fontdb: Arc::new(fonts), ..usvg::Options::default() };
     usvg::Tree::from_str(svg, &options).map_err(unconvertible)
 }
 

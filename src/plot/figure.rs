@@ -1,5 +1,7 @@
 //! A figure of given width: panels with axes and layers, a legend, a colour bar and text.
 
+use std::collections::HashSet;
+
 use super::canvas::{Anchor, Area, Canvas, MILLIMETRE, Stroke, Text};
 use super::colour::{hex, viridis};
 use super::label;
@@ -54,6 +56,9 @@ const KEY_WIDTH: f64 = 20.0;
 
 /// Number of points of a curve above which they have no marks. Chosen: more marks would touch.
 pub const MAX_MARKED_POINTS: usize = 50;
+
+/// Greatest number of places with a name in a panel; with more, there are no names. Chosen: more names overlap.
+const MAX_NAMES: usize = 60;
 
 /// Text styles of figures and of notes.
 const LABEL: Text = Text { size: SIZE, anchor: Anchor::Start, upwards: false, colour: "#000" };
@@ -192,13 +197,13 @@ impl Hover {
 /// An entry of a legend.
 #[derive(Debug, Clone)]
 pub struct Entry {
-    /// The sample of a legend entry.
+    /// Its sample.
     pub key: Key,
     /// The text, in markup.
     pub text: String,
 }
 
-/// An entry of a legend.
+/// The sample of an entry of a legend.
 #[derive(Debug, Clone)]
 pub enum Key {
     /// A line.
@@ -569,32 +574,36 @@ impl Panel {
         (is_inside(self.x.scale.fraction(x)) && is_inside(self.y.scale.fraction(y))).then(|| self.place(area, (x, y)))
     }
 
-    /// Draws the name of each row once, near one of its marks, where it meets neither a mark nor another name; a name without space is left out.
+    /// Draws the name of each row near its mark, where it meets neither a mark nor another name; a name without space is left out. Rows of one name
+    /// at one `x`, such as those of a material, have it once.
     fn draw_names(&self, canvas: &mut Canvas, area: Area) {
         let size = 2.0 * RADIUS;
         let around = |(x, y): (f64, f64)| Area { x: x - RADIUS, y: y - RADIUS, width: size, height: size };
-        let marks =
-            self.layers.iter().filter_map(|layer| if let Layer::Marks(marks) = layer { Some(marks) } else { None });
-        let mut taken: Vec<Area> = marks.flatten().filter_map(|(at, _)| self.inside(area, *at)).map(around).collect();
-        let mut drawn: Vec<&str> = Vec::new();
-        let names =
-            self.layers.iter().filter_map(|layer| if let Layer::Names(names) = layer { Some(names) } else { None });
-        for (at, name) in names.flatten() {
-            let Some((x, y)) = self.inside(area, *at).filter(|_| !drawn.contains(&name.as_str())) else { continue };
+        let (mut taken, mut names) = (Vec::new(), Vec::new());
+        for layer in &self.layers {
+            match layer {
+                Layer::Marks(marks) => {
+                    taken.extend(marks.iter().filter_map(|(at, _)| self.inside(area, *at)).map(around))
+                }
+                Layer::Names(of_layer) => names.extend(of_layer),
+                _ => {}
+            }
+        }
+        let key = |((x, _), name): &((f64, f64), String)| (name.clone(), x.to_bits());
+        let places: HashSet<_> = names.iter().map(|named| key(named)).collect();
+        let mut undrawn = if places.len() > MAX_NAMES { HashSet::new() } else { places };
+        for named in names {
+            let (at, name) = named;
+            let Some((x, y)) = self.inside(area, *at).filter(|_| undrawn.contains(&key(named))) else { continue };
             let wide = NOTE_SIZE * label::width(name);
             let around_mark =
                 [(x + 3.5, y), (x - 3.5 - wide, y), (x - 0.5 * wide, y - NOTE_SIZE), (x - 0.5 * wide, y + NOTE_SIZE)];
             let boxes = around_mark.map(|(x, y)| Area { x, y: y - 0.5 * NOTE_SIZE, width: wide, height: NOTE_SIZE });
-            let is_free = |place: &&Area| {
-                let is_within = place.x >= area.x && place.x + wide <= area.x + area.width && place.y >= area.y;
-                is_within
-                    && place.y + NOTE_SIZE <= area.y + area.height
-                    && !taken.iter().any(|other| place.meets(other))
-            };
+            let is_free = |place: &&Area| area.holds(place) && !taken.iter().any(|other| place.meets(other));
             let Some(place) = boxes.iter().find(is_free).copied() else { continue };
             canvas.text((place.x, place.y + 0.85 * NOTE_SIZE), name, &Text { colour: "#333", ..NOTE });
             taken.push(place);
-            drawn.push(name);
+            undrawn.remove(&key(named));
         }
     }
 

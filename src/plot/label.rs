@@ -237,15 +237,12 @@ pub fn number(value: f64) -> String {
 pub fn number_among(value: f64, others: &[f64]) -> String {
     let needs_power = |other: &f64| other.is_finite() && *other != 0.0 && !(1e-3..99_999.5).contains(&other.abs());
     let as_powers = others.iter().any(needs_power);
-    let special = match value {
-        0.0 => "0",
-        f64::INFINITY => "∞",
-        f64::NEG_INFINITY => "−∞",
-        _ if value.is_nan() => "–",
-        _ => "",
-    };
-    if !special.is_empty() {
-        return special.to_owned();
+    match value {
+        0.0 => return "0".to_owned(),
+        f64::INFINITY => return "∞".to_owned(),
+        f64::NEG_INFINITY => return "−∞".to_owned(),
+        _ if value.is_nan() => return "–".to_owned(),
+        _ => {}
     }
     let digits = digits(others);
     let scientific = format!("{:.*e}", digits - 1, value.abs());
@@ -264,16 +261,10 @@ pub fn number_among(value: f64, others: &[f64]) -> String {
 
 /// Digits that distinguish ascending numbers: five, or more for close ones.
 fn digits(values: &[f64]) -> usize {
-    if values.len() > MAX_COMPARED_VALUES {
-        return 5;
-    }
     let gap = |pair: &[f64]| (pair[1] - pair[0]).abs() / pair[1].abs().max(pair[0].abs());
     let least = values.windows(2).map(gap).filter(|gap| *gap > 0.0).fold(1.0, f64::min);
     (2.0 - least.log10().floor()).clamp(5.0, 17.0) as usize
 }
-
-/// Greatest number of values whose differences determine the number of digits. Chosen: a picture names fewer.
-const MAX_COMPARED_VALUES: usize = 1000;
 
 /// Breaks a text in markup into lines of at most `most` (in units of the font size), at spaces, but not around an equality sign.
 pub fn wrapped(markup: &str, most: f64) -> Vec<String> {

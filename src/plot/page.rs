@@ -40,16 +40,9 @@ impl Page {
 
     /// A table that sorts by a column when its name is clicked.
     pub fn table(&mut self, names: &[&str], rows: &[Vec<String>]) {
-        let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| -> String {
-            cells.map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect()
-        };
-        self.body.push_str("<table><thead><tr>");
-        self.body.push_str(&cells("th", &mut names.iter().copied()));
-        self.body.push_str("</tr></thead><tbody>\n");
-        for row in rows {
-            self.body.push_str(&format!("<tr>{}</tr>\n", cells("td", &mut row.iter().map(String::as_str))));
-        }
-        self.body.push_str("</tbody></table>\n");
+        let head = cells("th", names);
+        let rows: String = rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
+        self.body.push_str(&format!("<table><thead><tr>{head}</tr></thead><tbody>\n{rows}</tbody></table>\n"));
     }
 
     /// A picture; pointing at a map in it shows the value there.
@@ -92,6 +85,10 @@ impl Page {
              <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
         )
     }
+}
+
+fn cells(tag: &str, cells: &[impl AsRef<str>]) -> String {
+    cells.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell.as_ref()))).collect()
 }
 
 fn axis(axis: &Axis, middles: &[f64]) -> serde_json::Value {

@@ -58,20 +58,12 @@ pub struct Column {
 ///
 /// # Errors
 ///
-/// A file that is not a trace.
+/// A file that cannot be read.
 pub fn read(path: &Path) -> Result<TraceFile, PlotError> {
     let shown = path.display().to_string();
     let stem = path.file_stem().map_or_else(|| shown.clone(), |stem| stem.to_string_lossy().into_owned());
     let is_csv = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
     let (columns, facts) = if is_csv { csv(path, &shown)? } else { parquet(path)? };
-    let missing = ["t", "v"].into_iter().find(|name| !columns.iter().any(|column| column.name == *name));
-    if let Some(missing) = missing {
-        let found = columns.into_iter().map(|column| column.name).collect::<Vec<_>>().join(", ");
-        return Err(PlotError::Refused(format!(
-            "{shown}: not a trace: it has no column `{missing}`\n  found: {found}\n  help: `slipsweep trace … --out FILE` writes traces; \
-             of a dataset, name the folder"
-        )));
-    }
     Ok(TraceFile::new(columns, &facts, stem))
 }
 
@@ -146,7 +138,7 @@ fn parquet(path: &Path) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((headings.iter().zip(frame.columns).filter_map(column).collect(), facts.into_iter().filter_map(fact).collect()))
 }
 
-/// The columns of a CSV, and its comments `# key = value`. Without a comment on units, those of a trace of slipsweep are scaled, and others unknown.
+/// The columns of a CSV, and its comments `# key = value`.
 fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     let text = file::open(path)
         .and_then(std::io::read_to_string)
@@ -156,15 +148,12 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
         .filter_map(|line| line.trim_start_matches('#').split_once('='))
         .map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
         .collect();
-    let fact = |name: &str| facts.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str());
-    let (units, is_ours) = (fact("units").unwrap_or_default(), fact("protocol").is_some());
+    let units = facts.iter().find(|(key, _)| key == "units").map_or("", |(_, value)| value);
     let units: Vec<&str> = units.split(", ").collect();
     let mut lines = text.lines().enumerate().skip_while(|(_, line)| line.starts_with('#'));
     let names = lines.next().map_or("", |(_, line)| line);
     let column = |(place, name): (usize, &str)| {
-        let unit = units.get(place).copied().filter(|known| !known.is_empty());
-        let scaled = || COLUMNS.iter().position(|column| is_ours && column.name == name).map_or("", trace::unit);
-        let unit = unit.unwrap_or_else(scaled);
+        let unit = units.get(place).copied().unwrap_or_default();
         Column { name: name.to_owned(), unit: unit.to_owned(), cells: Vec::new() }
     };
     let mut columns: Vec<Column> = names.split(',').map(str::trim).enumerate().map(column).collect();
@@ -189,12 +178,8 @@ fn csv(path: &Path, shown: &str) -> Result<(Vec<Column>, Facts), PlotError> {
     Ok((columns, facts))
 }
 
-/// A curve of a panel: numbers of its trace and column, and its points.
-struct Curve {
-    trace: usize,
-    rank: usize,
-    points: Vec<(f64, f64)>,
-}
+/// The curves of a trace in a panel: that of the block, then that of the control.
+type Curves = Vec<Vec<(f64, f64)>>;
 
 /// The figure of traces, with a panel for each group of columns with values, or for the column `y`, over the column `x`, or over time.
 ///
@@ -229,11 +214,8 @@ pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure,
         let has_bound = names[0] == "v" && (0.0..2.0).contains(&scale.low) && y.unit == UNIT_OF_BOUND;
         let layers = has_bound.then_some(bound).into_iter().collect();
         let fewer = |points| if x == "t" { thinned(points) } else { spaced(points, [&x_axis.scale, &y.scale]) };
-        let of_course = |(trace, of): (usize, &TraceFile)| {
-            let points = names.iter().enumerate().map(|(rank, name)| (rank, of.points(x, name).map(fewer)));
-            points.filter_map(|(rank, points)| Some(Curve { trace, rank, points: points? })).collect::<Vec<_>>()
-        };
-        let curves: Vec<Curve> = traces.iter().enumerate().flat_map(of_course).collect();
+        let curves_of = |of: &TraceFile| names.iter().filter_map(|name| of.points(x, name).map(fewer)).collect();
+        let curves: Vec<Curves> = traces.iter().map(curves_of).collect();
         panels.push((Panel { title: String::new(), x: x_axis, y, layers }, curves));
     }
     let leaders = leaders(traces.len(), &panels);
@@ -243,7 +225,7 @@ pub fn figure(traces: &[TraceFile], [x, y]: [Option<&str>; 2]) -> Result<Figure,
         _ => "Protocols".to_owned(),
     };
     let subtitle = equations(&common, &unit_in(traces, "t"));
-    let has_control = panels.iter().any(|(_, curves)| curves.iter().any(|curve| curve.rank > 0));
+    let has_control = panels.iter().any(|(_, curves)| curves.iter().any(|of_trace| of_trace.len() > 1));
     let legend = legend(traces, &leaders, &common, has_control);
     let panels = panels.into_iter().map(|(panel, curves)| draw(panel, curves, traces, &leaders));
     let panels: Vec<Panel> = panels.collect();
@@ -277,27 +259,27 @@ fn one_unit<'a>(traces: &[TraceFile], names: impl Iterator<Item = &'a str>) -> R
 }
 
 /// For each trace, the first trace with which it coincides in all panels.
-fn leaders(count: usize, panels: &[(Panel, Vec<Curve>)]) -> Vec<usize> {
+fn leaders(count: usize, panels: &[(Panel, Vec<Curves>)]) -> Vec<usize> {
     coincide::leaders(count, |one, other| {
         panels.iter().all(|(panel, curves)| {
-            let own = |trace: usize| curves.iter().filter(move |curve| curve.trace == trace);
             let fraction = |(x, y): &(f64, f64)| (panel.x.scale.fraction(*x), panel.y.scale.fraction(*y));
-            let fractions = |curve: &Curve| -> Vec<(f64, f64)> { curve.points.iter().map(fraction).collect() };
-            let is_same = |(one, other): (&Curve, &Curve)| {
-                one.rank == other.rank && coincide::anywhere(&fractions(one), &fractions(other))
-            };
-            own(one).count() == own(other).count() && own(one).zip(own(other)).all(is_same)
+            let [one, other] = [one, other].map(|trace| {
+                curves[trace].iter().map(|curve| curve.iter().map(fraction).collect()).collect::<Curves>()
+            });
+            one.len() == other.len() && one.iter().zip(&other).all(|(one, other)| coincide::anywhere(one, other))
         })
     })
 }
 
 /// The panel with the curves of the leading traces.
-fn draw(mut panel: Panel, curves: Vec<Curve>, traces: &[TraceFile], leaders: &[usize]) -> Panel {
-    for Curve { trace, rank, points } in curves.into_iter().filter(|curve| leaders[curve.trace] == curve.trace) {
-        let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
-        panel.layers.push(Layer::Line(points.clone(), stroke));
-        if traces[trace].is_marked() && rank == 0 {
-            panel.layers.push(Layer::marks(points, trace));
+fn draw(mut panel: Panel, curves: Vec<Curves>, traces: &[TraceFile], leaders: &[usize]) -> Panel {
+    for (trace, curves) in curves.into_iter().enumerate().filter(|(trace, _)| leaders[*trace] == *trace) {
+        for (rank, points) in curves.into_iter().enumerate() {
+            let stroke = if rank == 0 { colour::series(trace) } else { control(trace) };
+            panel.layers.push(Layer::Line(points.clone(), stroke));
+            if traces[trace].is_marked() && rank == 0 {
+                panel.layers.push(Layer::marks(points, trace));
+            }
         }
     }
     panel
@@ -368,10 +350,10 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 }
 
 /// Greatest number of points of a curve that may turn back. Chosen: a hundred loops stay smooth.
-const MAX_TURNING_POINTS: usize = 40_000;
+const MAX_TURNING_POINTS: usize = 5 * MAX_POINTS;
 
-/// Least distance of the points of such a curve, as a fraction of the panel. Chosen: half a dot of a wide picture in print.
-const MIN_DISTANCE: f64 = 5e-4;
+/// Least distance of the points of such a curve, as a fraction of the panel. Derived: a dot of a wide picture in print.
+const MIN_DISTANCE: f64 = 4.0 / MAX_POINTS as f64;
 
 /// Points at equal distances along a curve over these scales, at least, with the first and the last.
 fn spaced(points: Vec<(f64, f64)>, [x, y]: [&Scale; 2]) -> Vec<(f64, f64)> {

@@ -115,7 +115,7 @@ fn every_table_has_its_picture() {
     let words: Vec<String> = all.iter().map(|svg| words_of(svg)).collect();
     assert!(words.iter().all(|words| !words.contains("NaN")));
     for part in
-        ["Work gap of the cubic shortcuts", "infeasible", "vmin = 1", "best shortcut", "α2 tf", "α3 tf2", "tf = 0.02"]
+        ["Landscape of cubic shortcuts", "infeasible", "vmin = 1", "best shortcut", "α2 tf", "α3 tf2", "tf = 0.02"]
     {
         assert!(words[0].contains(part), "{part} in {}", words[0]);
     }
@@ -131,6 +131,9 @@ fn every_table_has_its_picture() {
     assert!(words[0].contains("a = 0.03 μ0, b = 0.05 μ0, vi = 3 v0"), "{}", words[0]);
     assert!(words.iter().all(|words| !words.contains("--")));
     assert!(words[5].contains("kc(vf)") && words[5].contains("k (μ0 σ/l)"), "{}", words[5]);
+    // A title names no column, since another may be drawn.
+    shown(folder, &["plot", "results/small", "--table", "gap", "--color", "v_min", "--out", "v_min.svg"]);
+    assert!(!words_of(&read(folder, "v_min.svg")).contains("gap"));
     // A second picture has the same bytes.
     shown(folder, &["plot", "results/small", "--table", "gap", "--out", "again.svg"]);
     assert_eq!(read(folder, "again.svg"), all[0]);
@@ -621,17 +624,21 @@ fn regress_labels_stay_in_the_legend_when_another_axis_varies() {
 const MATERIALS: &str = "sample,a,b\nm1,0.010,0.015\nm2,0.009,0.0125\nm3,0.0085,0.0095\nm4,0.0075,0.011\nm5,0.006,0.010\n\
                          m6,0.011,0.012\nm7,0.012,0.008\nm8,0.010,0.006\nm9,0.014,0.009\nm10,0.005,0.009\n";
 
-/// A dataset of [`MATERIALS`] in a folder of its own.
-fn materials(axes: &str, tables: &str) -> tempfile::TempDir {
+/// A dataset of these points in a folder of its own.
+fn of_points(points: &str, spec: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("points.csv"), MATERIALS).expect("is writable");
-    let spec = format!("name = \"m\"\npoints = \"points.csv\"\n[axes]\nv_i = 3.0\nv_f = 100.0\n{axes}\n{tables}\n");
-    fs::write(folder.path().join("spec.toml"), spec).expect("is writable");
+    fs::write(folder.path().join("points.csv"), points).expect("is writable");
+    fs::write(folder.path().join("spec.toml"), format!("name = \"m\"\n{spec}\n")).expect("is writable");
     shown(folder.path(), &["run", "spec.toml", "--quiet"]);
     folder
 }
 
-/// What the terminal shows, and the words of a picture of [`materials`].
+/// A dataset of [`MATERIALS`].
+fn materials(axes: &str, tables: &str) -> tempfile::TempDir {
+    of_points(MATERIALS, &format!("points = \"points.csv\"\n[axes]\nv_i = 3.0\nv_f = 100.0\n{axes}\n{tables}"))
+}
+
+/// What the terminal shows, and the words of a picture of the dataset `m`.
 fn drawn(folder: &Path, arguments: &[&str]) -> (String, String) {
     let said = shown(folder, &[&["plot", "results/m", "--out", "drawn.svg"], arguments].concat());
     (said.split_once('\n').expect("a line").1.to_owned(), words(&read(folder, "drawn.svg")))
@@ -663,6 +670,11 @@ fn labelled_points_are_dots_or_panels() {
         assert!(said.is_empty() && names == 10, "{said}{words}");
         assert_eq!(read(folder, "drawn.svg").matches("<circle").count(), 10);
     }
+    assert_eq!(
+        complaint(folder, &["plot", "results/m", "--table", "crossover", "--x", "a", "--color", "b"]),
+        "error: --color b: an axis of 9 values\n  expected: at most 7, each with a symbol\n  help: --x a --y b draws a map\n"
+    );
+    drawn(folder, &["--table", "crossover", "--x", "a", "--y", "b"]);
     let plot = ["plot", "results/m", "--table", "optimal"];
     let with = |more: &[&str]| complaint(folder, &[&plot, more].concat());
     assert_eq!(
@@ -758,4 +770,64 @@ fn maps_of_both_signs_show_where_the_column_is_zero() {
     assert!(lines(&svg) > 0 && lines(&other) > 0);
     let (stable, _) = picture("stable", &spec("").replace("b = 0.015", "b = 0.005"), "stability");
     assert!(!stable.contains("= 0\n"), "{stable}");
+}
+
+/// A requested label distinguishes lines of points that have the same axes.
+#[test]
+fn regress_a_label_as_colour_distinguishes_equal_points() {
+    let points = "rock,a,b\ngranite,0.03,0.05\nbasalt,0.03,0.05\nquartz,0.02,0.03\n";
+    let axes = "points = \"points.csv\"\n[axes]\nt_f = [0.02, 0.05, 0.1]\nv_i = 3.0\nv_f = 100.0\n[tables.optimal]";
+    let folder = of_points(points, axes);
+    let (said, words) = drawn(folder.path(), &["--table", "optimal", "--y", "work", "--color", "rock"]);
+    assert!(said.is_empty() && words.contains("\ngranite; basalt\nquartz\n"), "{said}{words}");
+}
+
+/// If only one block has a label, each of its dots has the name.
+#[test]
+fn regress_no_dot_has_the_name_of_a_block_alone() {
+    let points = "rock,a,b\ngranite,0.020,0.030\ngranite,0.010,0.018\ngranite,0.015,0.016\n";
+    let velocities = "v_i = 3.0\nv_f = 100.0\n";
+    let blocks = format!(
+        "[[block]]\npoints = \"points.csv\"\n[block.axes]\n{velocities}[[block]]\n[block.axes]\na = 0.03\nb = 0.05\n{velocities}\
+         [tables.crossover]"
+    );
+    let folder = of_points(points, &blocks);
+    let (_, words) = drawn(folder.path(), &["--table", "crossover", "--x", "a", "--y", "t_cross"]);
+    assert_eq!(read(folder.path(), "drawn.svg").matches("<circle").count(), 4);
+    assert_eq!(words.lines().filter(|line| *line == "granite").count(), 3, "{words}");
+}
+
+/// An axis of more values than are kept is as long as it is: sampled rows have cells for several of them.
+#[test]
+fn regress_maps_of_many_samples_are_filled() {
+    let spec = format!(
+        "[axes]\n{MATERIAL}v_f = {{ sobol = [10.0, 1000.0, 150000], seed = 1 }}\nt_f = {{ sobol = [0.01, 0.1, 150000], seed = 1 }}\n\
+         [tables.optimal]\ncolumns = [\"work\"]\n"
+    );
+    let (map, svg) = picture("samples", &spec, "optimal");
+    let note = "Several rows fall into one cell (193 cells of tf and 193 cells of vf); the cell shows the least value.";
+    assert!(svg.contains("<image") && map.replace('\n', " ").contains(note), "{map}");
+}
+
+/// A cell with rows of several labels shows one of them, and the picture says so.
+#[test]
+fn regress_several_labels_of_a_cell_are_noted() {
+    let grid = "t_f = { geomspace = [0.01, 0.1, 5] }\nv_f = { geomspace = [50.0, 200.0, 5] }\nv_i = 3.0\n";
+    let spec = format!("points = \"points.csv\"\n[axes]\n{grid}[tables.optimal]");
+    let folder = of_points("rock,a,b\ngranite,0.03,0.05\nbasalt,0.03,0.05\n", &spec);
+    let (_, words) = drawn(folder.path(), &["--table", "optimal", "--x", "t_f", "--y", "v_f", "--color", "rock"]);
+    let note = "Several rows fall into one cell; the cell shows the first word of the legend.";
+    assert!(words.contains("\ngranite\n") && words.replace('\n', " ").contains(note), "{words}");
+}
+
+/// A panel of a crossing without rows is blank, not hatched as infeasible.
+#[test]
+fn regress_panels_without_rows_are_blank() {
+    let spec = "where = \"t_f < 0.025 or b < 0.045\"\n[axes]\nt_f = [0.01, 0.02, 0.03]\na = 0.03\nb = [0.04, 0.05]\nv_i = 3.0\n\
+                v_f = 100.0\nalpha_2 = { linspace = [-0.3, 0.1, 11], unit = \"1/t_f\" }\n\
+                alpha_3 = { linspace = [-0.3, 0.3, 11], unit = \"1/t_f^2\" }\n[tables.gap]\n";
+    let (map, svg) = picture("blank", spec, "gap");
+    // Five panels and the colour bar.
+    assert_eq!(svg.matches("<image").count(), 6);
+    assert!(map.contains("\nBlank panels have no rows.\n") && !map.contains("no row\n"), "{map}");
 }

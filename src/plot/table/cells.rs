@@ -6,7 +6,7 @@ use crate::plot::scale::{Scale, is_logarithmic};
 /// The cells of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisCells {
-    /// Their centres, ascending: the values themselves if each has a cell.
+    /// Their middle values, ascending: the values themselves if each has a cell.
     pub middles: Vec<f64>,
     /// The scale from the edge of the first cell to the edge of the last.
     pub scale: Scale,
@@ -14,7 +14,7 @@ pub struct AxisCells {
     pub even: bool,
     /// Whether each value has a cell of its own.
     pub exact: bool,
-    /// The least value of each cell; empty if the values are too many to keep, and cells are equal intervals.
+    /// The least value of each cell.
     firsts: Vec<f64>,
 }
 
@@ -24,10 +24,6 @@ impl AxisCells {
         let values = &axis.values;
         let (low, high) = (values[0], values[values.len() - 1]);
         let span = Scale { low, high, log: is_logarithmic(values) };
-        if axis.many {
-            let middles = (0..most).map(|cell| span.value((cell as f64 + 0.5) / most as f64)).collect();
-            return AxisCells { middles, scale: span, even: true, exact: false, firsts: Vec::new() };
-        }
         let last = values.len() - 1;
         if last == 0 {
             let scale = span.with_room(0.0);
@@ -36,27 +32,23 @@ impl AxisCells {
         // Cells with equal numbers of values, so that none is empty.
         let together = values.len().div_ceil(most);
         let firsts: Vec<f64> = values.chunks(together).map(|chunk| chunk[0]).collect();
+        let middles: Vec<f64> = values.chunks(together).map(|chunk| chunk[chunk.len() / 2]).collect();
         let exact = together == 1;
         let even = values
             .iter()
             .enumerate()
             .all(|(place, &value)| (span.fraction(value) * last as f64 - place as f64).abs() < 0.02);
-        // A value, or a point between two values, by its index.
         let at = |place: f64| span.value(place / last as f64);
-        if even {
-            let middle = |cell: usize| at((cell * together) as f64 + 0.5 * (together - 1) as f64);
-            let middles = if exact { values.clone() } else { (0..firsts.len()).map(middle).collect() };
+        let [low, high] = if even {
             // Half a step beyond the first value and the last cell, which may have fewer values.
-            let scale = Scale { low: at(-0.5), high: at((firsts.len() * together) as f64 - 0.5), ..span };
-            return AxisCells { middles, scale, even, exact, firsts };
-        }
-        let middles: Vec<f64> = values.chunks(together).map(|chunk| chunk[chunk.len() / 2]).collect();
-        let fractions: Vec<f64> = middles.iter().map(|&middle| span.fraction(middle)).collect();
-        // Half a cell beyond the first and the last centre.
-        let beyond = |edge: usize, inner: usize| span.value(1.5 * fractions[edge] - 0.5 * fractions[inner]);
-        let end = fractions.len() - 1;
-        let scale = Scale { low: beyond(0, 1), high: beyond(end, end - 1), ..span };
-        AxisCells { middles, scale, even, exact, firsts }
+            [at(-0.5), at((firsts.len() * together) as f64 - 0.5)]
+        } else {
+            // Half a cell beyond the first and the last centre.
+            let fraction = |cell: usize| span.fraction(middles[cell]);
+            let end = middles.len() - 1;
+            [(0, 1), (end, end - 1)].map(|(edge, inner)| span.value(1.5 * fraction(edge) - 0.5 * fraction(inner)))
+        };
+        AxisCells { middles, scale: Scale { low, high, ..span }, even, exact, firsts }
     }
 
     /// Number of cells.
@@ -77,12 +69,7 @@ impl AxisCells {
         if self.exact {
             return self.middles.binary_search_by(|middle| middle.total_cmp(&(value + 0.0))).ok();
         }
-        if !self.firsts.is_empty() {
-            return self.firsts.partition_point(|first| first.total_cmp(&(value + 0.0)).is_le()).checked_sub(1);
-        }
-        let fraction = self.scale.fraction(value);
-        let place = (fraction * self.len() as f64).floor();
-        (-1e-12..=1.0 + 1e-12).contains(&fraction).then(|| (place.max(0.0) as usize).min(self.len() - 1))
+        self.firsts.partition_point(|first| first.total_cmp(&(value + 0.0)).is_le()).checked_sub(1)
     }
 
     /// The value at a fraction between the centres of two cells, counted in cells.

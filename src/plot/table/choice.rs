@@ -1,6 +1,6 @@
 //! The choice of axes and columns: from the request, else from the varying axes.
 
-use super::filtered::{FilteredTable, Values};
+use super::filtered::{FilteredTable, MAX_VALUES, Values};
 use super::lines;
 use super::map;
 use super::{PROTOCOL_DEFAULTS, Request, TablePicture};
@@ -82,15 +82,11 @@ pub fn choose(filtered: &FilteredTable, defaults: &TablePicture, request: &Reque
     let written = || defaults.lines.iter().copied().filter(|column| filtered.has(column));
     let y = y.map_or_else(|| written().map(str::to_owned).collect(), |y| vec![y.to_owned()]);
     if let Some(colour) = request.colour.as_deref().filter(|_| filtered.is_of_dot(&x))
-        && choice.has_symbols(&x, colour, y.first())?
+        && choice.has_symbols(&x, colour)?
     {
         return Ok(Shape::Lines(lines::LineColumns { x, y, series: Some(colour.to_owned()), has_symbols: true }));
     }
-    // A label stands for the axes of its points.
-    let of_label = request.colour.as_deref().filter(|colour| filtered.is_label(colour));
-    let of_label = of_label.and_then(|_| choice.varying.iter().find(|axis| filtered.is_of_point(&axis.name)));
-    let colour = colour.or(of_label.map(|axis| axis.name.as_str()).filter(|name| *name != x));
-    let series = colour.map(str::to_owned).or_else(|| choice.find(defaults.series, Some(&x), 2));
+    let series = request.colour.clone().or_else(|| choice.find(defaults.series, Some(&x), 2));
     Ok(Shape::Lines(lines::LineColumns { x, y, series, has_symbols: false }))
 }
 
@@ -132,7 +128,7 @@ impl<'a> Choice<'a> {
 
     /// The first of `names`, except `not`, with at least `least` values.
     fn find(&self, names: &[&str], not: Option<&str>, least: usize) -> Option<String> {
-        let fits = |axis: &&&Values| Some(axis.name.as_str()) != not && (axis.values.len() >= least || axis.many);
+        let fits = |axis: &&&Values| Some(axis.name.as_str()) != not && axis.values.len() >= least;
         let named = |name: &&str| self.varying.iter().filter(fits).find(|axis| axis.name == *name);
         Some(names.iter().find_map(named)?.name.clone())
     }
@@ -144,7 +140,7 @@ impl<'a> Choice<'a> {
     }
 
     /// Whether dots over `x` have symbols for the values of `colour`: a label of few words, else each dot has its name, or another axis of the points.
-    fn has_symbols(&self, x: &str, colour: &str, y: Option<&String>) -> Result<bool, PlotError> {
+    fn has_symbols(&self, x: &str, colour: &str) -> Result<bool, PlotError> {
         let filtered = self.filtered;
         if filtered.is_label(colour) {
             return Ok((2..=MAX_SERIES).contains(&filtered.words(colour).len()));
@@ -157,11 +153,12 @@ impl<'a> Choice<'a> {
         if axis.values.len() <= MAX_SERIES {
             return Ok(true);
         }
-        let y = y.map_or("COLUMN", String::as_str);
+        let count = if axis.many { format!("over {MAX_VALUES}") } else { axis.values.len().to_string() };
+        // A map without a requested column shows one with numbers.
+        let of_column = self.request.y.as_ref().map_or(String::new(), |y| format!(" --color {y}"));
         Err(PlotError::Refused(format!(
-            "--color {colour}: an axis of {} values\n  expected: at most {MAX_SERIES}, each with a symbol\n  help: --x {x} --y {colour} --color {y} \
-             draws a map",
-            axis.values.len()
+            "--color {colour}: an axis of {count} values\n  expected: at most {MAX_SERIES}, each with a symbol\n  help: --x {x} \
+             --y {colour}{of_column} draws a map"
         )))
     }
 

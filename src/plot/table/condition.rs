@@ -126,12 +126,11 @@ impl Condition {
         let quoted = |value: &String| {
             if value.contains([' ', ',', '(', ')']) { format!("'{value}'") } else { value.clone() }
         };
-        match (value, self.values.as_slice()) {
+        let values: Vec<String> = self.values.iter().map(quoted).collect();
+        match (value, values.as_slice()) {
             (Some(value), _) => format!("{}={}", self.column, format!("{value:?}").trim_end_matches(".0")),
-            (None, [value]) => format!("{}{}{}", self.column, self.sign(), quoted(value)),
-            (None, several) => {
-                format!("{} in ({})", self.column, several.iter().map(quoted).collect::<Vec<_>>().join(", "))
-            }
+            (None, [value]) => format!("{}{}{value}", self.column, self.sign()),
+            (None, several) => format!("{} in ({})", self.column, several.join(", ")),
         }
     }
 

@@ -11,18 +11,15 @@ use super::condition::Condition;
 use super::groups::Gridded;
 use crate::dataset::frame::{self, Cells, Frame, Heading};
 use crate::dataset::{Folder, Manifest, ReadError};
-use crate::grid::Quantity;
+use crate::grid::{Quantity, mixed};
 use crate::names;
 use crate::plot::{PlotError, label};
 use crate::sweep::Spec;
 use crate::table::{self, Kind, STATUS};
 
-/// Greatest number of kept values of an axis; of more, only the range is kept. Chosen: 25 times the cells of the finest picture, and a few
-/// megabytes.
-const MAX_VALUES: usize = 100_000;
-
-/// Greatest number of words of a label that names dots. Chosen: more names overlap.
-const MAX_NAMES: usize = 60;
+/// Greatest number of kept values of an axis; of more, the ends and a random sample of at least half as many. Chosen: 25 times the positions of
+/// the finest picture, and a few megabytes.
+pub const MAX_VALUES: usize = 100_000;
 
 /// Greatest number of distinct labels of a column; columns with more are ignored. Chosen: more are not readable in a picture.
 const MAX_LABELS: usize = 1000;
@@ -44,7 +41,7 @@ pub struct Values {
     pub values: Vec<f64>,
     /// The words, if it has words.
     pub words: Vec<String>,
-    /// Whether there are too many values to keep: these are the least and the greatest.
+    /// Whether there are too many values to keep: these are the ends and a sample.
     pub many: bool,
     /// Whether some rows have an infinite value, which an axis cannot show.
     pub infinite: bool,
@@ -74,7 +71,7 @@ impl Values {
         let infinite = self.infinite.then_some(f64::INFINITY);
         let typed: Vec<String> = self.values.iter().copied().chain(infinite).map(|value| self.typed(value)).collect();
         match typed.as_slice() {
-            [first, .., last] if self.many || typed.len() > MAX_LISTED_VALUES => {
+            [first, .., last] if typed.len() > MAX_LISTED_VALUES => {
                 format!("{} from {first} to {last}", self.name)
             }
             all => format!("{} = {}", self.name, all.join(", ")),
@@ -160,9 +157,7 @@ impl FilteredTable {
                     condition.column
                 )));
             }
-            let columns = table::find(name).map_or(&[][..], |table| table.columns());
-            let kind = columns.iter().find(|column| column.name == condition.column).map(|column| column.kind);
-            if let Some(Kind::Label(words)) = kind
+            if let Some(Kind::Label(words)) = filtered.kind(&condition.column)
                 && let Some(word) = condition.values.iter().find(|word| !words.contains(&word.as_str()))
             {
                 let found = format!("--where {}: `{}` is never `{word}`", condition.shown(), condition.column);
@@ -187,12 +182,9 @@ impl FilteredTable {
 
     /// The labels and their words, except labels with too many words for a picture.
     fn read_labels(&self) -> Result<Vec<(String, Vec<String>)>, PlotError> {
-        let known = table::find(&self.table);
-        let is_column =
-            |name: &str| known.is_some_and(|table| table.columns().iter().any(|column| column.name == name));
         let is_label = |heading: &&Heading| {
             let name = heading.name.as_str();
-            !heading.is_number && Quantity::from_name(name).is_none() && !is_column(name) && name != STATUS
+            !heading.is_number && Quantity::from_name(name).is_none() && self.kind(name).is_none() && name != STATUS
         };
         let names: Vec<String> = self.headings.iter().filter(is_label).map(|heading| heading.name.clone()).collect();
         let mut labels: Vec<(String, Vec<String>)> = names.into_iter().map(|name| (name, Vec::new())).collect();
@@ -219,16 +211,12 @@ impl FilteredTable {
             return Ok(());
         }
         let is_common = self.determined(&self.label_columns(), &[])?;
-        let mut first = Vec::new();
-        self.each_while(&self.label_columns(), |row| {
-            first = row.to_vec();
-            false
-        })?;
-        for (place, (name, words)) in std::mem::take(&mut self.labels).into_iter().enumerate() {
-            if !is_common[place] {
-                self.labels.push((name, words));
-            } else if !first[place].is_nan() {
-                self.common_labels.push((name, words[first[place] as usize].clone()));
+        let (found, _) = self.values(&self.label_columns())?;
+        for ((label, found), is_common) in std::mem::take(&mut self.labels).into_iter().zip(found).zip(is_common) {
+            match found.values.as_slice() {
+                [word] if is_common => self.common_labels.push((label.0, label.1[*word as usize].clone())),
+                [] => {}
+                _ => self.labels.push(label),
             }
         }
         let varying = self.axes.iter().filter(|axis| axis.varies() && !self.labels.is_empty());
@@ -283,7 +271,7 @@ impl FilteredTable {
         names.iter().zip(cells).filter_map(word).collect::<Vec<_>>().join(", ")
     }
 
-    /// The labels that name a dot: one that determines all others, if there is one; without the label in the legend, and none with too many words.
+    /// The labels that name a dot: one that determines all others, if there is one; without the label in the legend.
     pub fn names_of_dots(&self, legend: Option<&str>) -> Result<Vec<&str>, PlotError> {
         let mut names = self.label_columns();
         for label in self.label_columns() {
@@ -293,8 +281,7 @@ impl FilteredTable {
             }
         }
         names.retain(|name| Some(*name) != legend);
-        let is_crowded = names.iter().any(|name| self.words(name).len() > MAX_NAMES);
-        Ok(if is_crowded { Vec::new() } else { names })
+        Ok(names)
     }
 
     /// Drops all labels but `name`, if it is one that varies.
@@ -342,20 +329,25 @@ impl FilteredTable {
         self.axes.iter().find(|axis| axis.name == name)
     }
 
+    /// The kind of a column of the definition of the table.
+    fn kind(&self, column: &str) -> Option<Kind> {
+        let columns = table::find(&self.table)?.columns();
+        columns.iter().find(|known| known.name == column).map(|known| known.kind)
+    }
+
     /// The possible words of a column, in the order of their indices.
     pub fn words(&self, column: &str) -> Vec<String> {
-        let owned = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect();
         if let Some((_, words)) = self.labels.iter().find(|(name, _)| name == column) {
             return words.clone();
         }
         if let Some((_, word)) = self.common_labels.iter().find(|(name, _)| name == column) {
             return vec![word.clone()];
         }
-        let known = table::find(&self.table).map_or(&[][..], |table| table.columns());
-        match known.iter().find(|known| known.name == column).map(|known| known.kind) {
-            Some(Kind::Flag) => owned(&["false", "true"]),
-            _ => owned(&table::vocabulary(&self.table, column)),
-        }
+        let words = match self.kind(column) {
+            Some(Kind::Flag) => vec!["false", "true"],
+            _ => table::vocabulary(&self.table, column),
+        };
+        words.into_iter().map(str::to_owned).collect()
     }
 
     /// Calls `visit` with the cells of `columns` for each row that meets the conditions: numbers, and indices of words in [`FilteredTable::words`]; NaN
@@ -445,13 +437,13 @@ impl FilteredTable {
         let axis = |name: &&str| Values {
             name: (*name).to_owned(),
             unit: self.unit(name),
-            values: vec![f64::INFINITY, f64::NEG_INFINITY],
+            values: Vec::new(),
             words: self.words(name),
             many: false,
             infinite: false,
         };
         let mut axes: Vec<Values> = names.iter().map(axis).collect();
-        let mut distinct: Vec<HashSet<u64>> = vec![HashSet::new(); names.len()];
+        let mut distinct = vec![DistinctValues::default(); names.len()];
         let mut last = vec![f64::NAN; names.len()];
         let mut rows = 0;
         self.each(names, |row| {
@@ -463,21 +455,15 @@ impl FilteredTable {
                 *last = value;
                 axis.infinite |= value.is_infinite();
                 if value.is_finite() {
-                    axis.values[0] = axis.values[0].min(value);
-                    axis.values[1] = axis.values[1].max(value);
-                    if distinct.len() <= MAX_VALUES {
-                        // -0 counts as 0.
-                        distinct.insert((value + 0.0).to_bits());
-                    }
+                    distinct.insert(value);
                 }
             }
         })?;
-        for (axis, distinct) in axes.iter_mut().zip(distinct) {
-            axis.many = distinct.len() > MAX_VALUES;
-            if !axis.many {
-                axis.values = distinct.into_iter().map(f64::from_bits).collect();
-                axis.values.sort_by(f64::total_cmp);
-            }
+        for (axis, DistinctValues { mut kept, ends, mask }) in axes.iter_mut().zip(distinct) {
+            kept.extend(ends.into_iter().flatten().map(f64::to_bits));
+            axis.many = mask > 0;
+            axis.values = kept.into_iter().map(f64::from_bits).collect();
+            axis.values.sort_by(f64::total_cmp);
         }
         Ok((axes, rows))
     }
@@ -519,6 +505,30 @@ impl FilteredTable {
             "--where {text}: no row of the table `{}` meets this\n  found: {found}\n  help: {help}",
             self.table
         )))
+    }
+}
+
+/// Distinct numbers: all, or the ends and those whose hashes are 0 where `mask` is 1, an even sample.
+#[derive(Debug, Clone, Default)]
+struct DistinctValues {
+    kept: HashSet<u64>,
+    ends: Option<[f64; 2]>,
+    mask: u64,
+}
+
+impl DistinctValues {
+    fn insert(&mut self, value: f64) {
+        // -0 counts as 0.
+        let value = value + 0.0;
+        let [low, high] = self.ends.unwrap_or([value; 2]);
+        self.ends = Some([low.min(value), high.max(value)]);
+        if mixed(value.to_bits()) & self.mask == 0 {
+            self.kept.insert(value.to_bits());
+        }
+        while self.kept.len() > MAX_VALUES {
+            self.mask = 2 * self.mask + 1;
+            self.kept.retain(|bits| mixed(*bits) & self.mask == 0);
+        }
     }
 }
 

@@ -5,20 +5,21 @@ use super::filtered::FilteredTable;
 use super::groups::Groups;
 use super::map::{self, MapFigure};
 use super::{Source, TableScene};
-use crate::grid::Quantity;
 use crate::model::Units;
 use crate::numerics::cubic::Cubic;
 use crate::plot::PlotError;
 use crate::plot::canvas::Stroke;
 use crate::plot::contour::contour;
 use crate::plot::figure::{Entry, Key, Layer};
-use crate::table::OPTIMUM_AXES;
 
 /// The axes of the landscape.
 const ALPHAS: [&str; 2] = ["alpha_2", "alpha_3"];
 
 /// Steps of the grid for the line `v = 1`, along both axes. Chosen: finer than the dots of a printer.
 const STEPS: usize = 300;
+
+/// Lines through points.
+type Lines = Vec<Vec<(f64, f64)>>;
 
 /// Adds the border and the best shortcut to a map of the landscape.
 pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigure) -> Result<(), PlotError> {
@@ -31,7 +32,7 @@ pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigur
     let from_table = best.iter().any(Option::is_some);
     let (mut any_line, mut any_zero, mut any_star) = (false, false, false);
     for (place, panel) in figure.panels.iter_mut().enumerate() {
-        if let Some(Border { lines, meets_zero }) = bound(scene, groups, place, cells) {
+        if let Some((lines, meets_zero)) = border_of(scene, groups, place, cells) {
             any_line |= !lines.is_empty();
             any_zero |= meets_zero;
             panel.layers.push(Layer::Contour(lines, stroke));
@@ -41,7 +42,9 @@ pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigur
         panel.layers.extend(star.map(Layer::Star));
     }
     if any_line {
-        figure.legend.push(Entry { key: Key::Contour(stroke), text: bound_in_words(scene, any_zero) });
+        let floor = if scene.source.units == Units::Scaled { "1" } else { "*v*_{0}" };
+        let zero = if any_zero { " or *θ* = 0" } else { "" };
+        figure.legend.push(Entry { key: Key::Contour(stroke), text: format!("*v*_{{min}} = {floor}{zero}") });
     }
     if any_star {
         let text = if from_table { "best shortcut" } else { "least gap of the grid" };
@@ -50,22 +53,9 @@ pub fn border(scene: &TableScene<'_>, plan: &map::MapColumns, map: &mut MapFigur
     Ok(())
 }
 
-fn bound_in_words(scene: &TableScene<'_>, meets_zero: bool) -> String {
-    let bound = if scene.source.units == Units::Scaled { "1" } else { "*v*_{0}" };
-    let zero = if meets_zero { " or *θ* = 0" } else { "" };
-    format!("*v*_{{min}} = {bound}{zero}")
-}
-
-/// The border of the shortcuts with `v >= 1`.
-struct Border {
-    lines: Vec<Vec<(f64, f64)>>,
-    /// Whether `theta` becomes 0 on a piece of it.
-    meets_zero: bool,
-}
-
 /// The border of the shortcuts with `v >= 1`, and whether `theta` becomes 0 on a piece of it, as it does far from the optimum. The border of
 /// feasibility is often closer than a cell, so the line is computed from the cubic: for `theta > 0`, `v >= 1` means `1 - theta' - theta >= 0`.
-fn bound(scene: &TableScene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<Border> {
+fn border_of(scene: &TableScene<'_>, groups: &Groups, panel: usize, cells: &[AxisCells; 2]) -> Option<(Lines, bool)> {
     let value = |name| scene.scaled(groups, panel, name);
     let (t_f, start, end) = (value("t_f")?, 1.0 / value("v_i")?, 1.0 / value("v_f")?);
     // Coefficients relative to `t_f` do not depend on it.
@@ -96,7 +86,7 @@ fn bound(scene: &TableScene<'_>, groups: &Groups, panel: usize, cells: &[AxisCel
     let neighbours =
         |node: usize| [node.checked_sub(1), Some(node + 1), node.checked_sub(STEPS + 1), Some(node + STEPS + 1)];
     let meets_zero = (0..margin.len()).any(|node| is_zero[node] && neighbours(node).into_iter().any(is_inside));
-    Some(Border { lines: lines.into_iter().map(|line| line.into_iter().map(place).collect()).collect(), meets_zero })
+    Some((lines.into_iter().map(|line| line.into_iter().map(place).collect()).collect(), meets_zero))
 }
 
 /// The best shortcut of each panel, from the table `best_cubic`, if the dataset has it.
@@ -110,11 +100,10 @@ fn best(scene: &TableScene<'_>, groups: &Groups) -> Result<Vec<Option<(f64, f64)
         Err(PlotError::Empty { .. }) => return Ok(found),
         filtered => filtered?,
     };
-    if !ALPHAS.iter().all(|alpha| filtered.heading(alpha).is_some()) {
+    if !ALPHAS.iter().all(|alpha| filtered.has(alpha)) {
         return Ok(found);
     }
-    let mut axes: Vec<&str> = OPTIMUM_AXES.iter().map(|axis| axis.name()).collect();
-    axes.extend([Quantity::Law.name(), Quantity::VelocityCeiling.name()].iter().filter(|axis| filtered.has(axis)));
+    let axes: Vec<&str> = filtered.axes.iter().map(|axis| axis.name.as_str()).collect();
     let values: Vec<Option<Vec<f64>>> =
         (0..found.len()).map(|group| axes.iter().map(|axis| scene.value(groups, group, axis)).collect()).collect();
     let columns: Vec<&str> = axes.iter().copied().chain(ALPHAS).collect();

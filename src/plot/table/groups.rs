@@ -195,10 +195,11 @@ impl Groups {
         }
         let all = found.len();
         let is_labelled = found.iter().any(|group| !group.label.is_empty());
-        // The axes that labels stand for.
-        let is_of_point = |axis: &usize| is_labelled && filtered.is_of_point(axes[*axis]);
+        // The axes that labels stand for, and the labels themselves.
+        let is_of_point =
+            |axis: &usize| is_labelled && (filtered.is_of_point(axes[*axis]) || filtered.is_label(axes[*axis]));
         let of_points: Vec<usize> = (0..axes.len()).filter(is_of_point).collect();
-        let different = varying(&values_of(&found));
+        let different = varying(found.iter().map(|group| &group.values));
         let words = |group: &FoundGroup, of: &[usize], has_label: bool| -> Vec<String> {
             let label = Some(group.label.clone()).filter(|label| has_label && !label.is_empty());
             let of: Vec<usize> = of.iter().copied().filter(|axis| !is_of_point(axis)).collect();
@@ -208,10 +209,9 @@ impl Groups {
         let (found, empty) = if found.is_empty() { (empty, found) } else { (found, empty) };
         let most = if makes == GroupRole::Panels { MAX_PANELS } else { MAX_SERIES };
         let series = series.and_then(|series| axes.iter().position(|axis| *axis == series));
-        let shown = choice(&joined(&found, &of_points), most, makes, series);
+        let shown = choice(&joined(&found, &of_points), most, series);
         let shown: Vec<&FoundGroup> = shown.into_iter().map(|place| &found[place]).collect();
-        let named: Vec<Vec<f64>> = shown.iter().map(|group| group.values.clone()).collect();
-        let named = varying(&named);
+        let named = varying(shown.iter().map(|group| &group.values));
         let same: Vec<usize> = different.iter().copied().filter(|axis| !named.contains(axis)).collect();
         let has_names = shown.iter().any(|group| group.label != shown[0].label);
         let name = |group: &FoundGroup, of: &[usize], has_label: bool| words(group, of, has_label).join(", ");
@@ -232,9 +232,9 @@ impl Groups {
             along: None,
         };
         if makes == GroupRole::Panels && !has_names {
-            let values = values_of(&found);
-            let free: Vec<usize> = varying(&values).into_iter().filter(|axis| !is_of_point(axis)).collect();
-            if groups.cross(filtered, &values, &free) {
+            let free = varying(found.iter().map(|group| &group.values));
+            let free: Vec<usize> = free.into_iter().filter(|axis| !is_of_point(axis)).collect();
+            if groups.cross(filtered, &found, &free) {
                 groups.held = words(&found[0], &free[..free.len() - 2], true);
             }
         }
@@ -244,18 +244,17 @@ impl Groups {
     }
 
     /// Crosses the last two of the axes numbered `varying`, at the first values of the others; whether they are independent.
-    fn cross(&mut self, filtered: &FilteredTable, found: &[Vec<f64>], varying: &[usize]) -> bool {
+    fn cross(&mut self, filtered: &FilteredTable, found: &[FoundGroup], varying: &[usize]) -> bool {
         let [.., first, second] = varying else { return false };
         let crossed = [*first, *second];
         let axis = |place: usize| filtered.axis(&self.axes[place]);
         let [Some(first), Some(second)] = crossed.map(axis) else { return false };
         let is_held = |axis: &usize| !crossed.contains(axis);
-        let found_here: Vec<&Vec<f64>> = found
-            .iter()
-            .filter(|group| (0..group.len()).filter(is_held).all(|axis| group[axis] == found[0][axis]))
-            .collect();
+        let held: Vec<usize> = (0..self.axes.len()).filter(is_held).collect();
+        let is_here = |group: &&FoundGroup| held.iter().all(|&axis| group.values[axis] == found[0].values[axis]);
+        let found_here: Vec<&FoundGroup> = found.iter().filter(is_here).collect();
         let values = |axis: usize| {
-            let mut values: Vec<f64> = found_here.iter().map(|group| group[axis]).collect();
+            let mut values: Vec<f64> = found_here.iter().map(|group| group.values[axis]).collect();
             values.sort_by(f64::total_cmp);
             values.dedup();
             values
@@ -276,23 +275,39 @@ impl Groups {
         let (rows, columns) =
             (some(&rows, side(rows.len(), columns.len())), some(&columns, side(columns.len(), rows.len())));
         let group = |(row, column): (f64, f64)| {
-            let mut values = found[0].clone();
+            let mut values = found[0].values.clone();
             (values[crossed[0]], values[crossed[1]]) = (row, column);
             Group { name: format!("{}, {}", first.text_of(row), second.text_of(column)), values }
         };
         self.shown = rows.iter().flat_map(|&row| columns.iter().map(move |&column| (row, column))).map(group).collect();
         let titles = |axis: &Values, values: &[f64]| values.iter().map(|&value| axis.text_of(value)).collect();
         self.crossed = Some([titles(first, &rows), titles(second, &columns)]);
-        self.left_out = found.iter().filter(|group| self.place(group).is_none()).count();
+        self.left_out = found.iter().filter(|group| self.place(&group.values).is_none()).count();
         true
     }
 
     /// The group with these values of the axes, if it is shown.
-    pub fn place(&self, values: &[f64]) -> Option<usize> {
+    fn place(&self, values: &[f64]) -> Option<usize> {
         let mut values = values.to_vec();
         self.makes.merge(&self.axes, &mut values);
         let is_same = |(own, value): (&f64, &f64)| own == value || own.is_nan() && value.is_nan();
         self.shown.iter().position(|group| group.values.iter().zip(&values).all(is_same))
+    }
+
+    /// Calls `visit` with the group and the cells of `columns` for each row of a shown group, as [`FilteredTable::each`].
+    pub fn each(
+        &self,
+        filtered: &FilteredTable,
+        columns: &[&str],
+        mut visit: impl FnMut(usize, &[f64]),
+    ) -> Result<(), PlotError> {
+        let all: Vec<&str> = self.axes.iter().map(String::as_str).chain(columns.iter().copied()).collect();
+        filtered.each(&all, |row| {
+            let (key, cells) = row.split_at(self.axes.len());
+            if let Some(group) = self.place(key) {
+                visit(group, cells);
+            }
+        })
     }
 
     /// A figure without panels, to which each group adds one; `aspect` applies to a single panel.
@@ -411,14 +426,10 @@ fn find(
     Ok(found)
 }
 
-fn values_of(found: &[FoundGroup]) -> Vec<Vec<f64>> {
-    found.iter().map(|group| group.values.clone()).collect()
-}
-
 /// The values of labelled groups with the axes numbered `of_points`, which advance together, as one: the first of them has the number of the label.
 fn joined(found: &[FoundGroup], of_points: &[usize]) -> Vec<Vec<f64>> {
     let mut labels: IndexSet<&str> = IndexSet::new();
-    let mut joined = values_of(found);
+    let mut joined: Vec<Vec<f64>> = found.iter().map(|group| group.values.clone()).collect();
     for (group, values) in found.iter().zip(&mut joined) {
         let number = labels.insert_full(&group.label).0;
         for (place, &axis) in of_points.iter().enumerate() {
@@ -441,34 +452,22 @@ fn in_words(filtered: &FilteredTable, axes: &[&str], of: &[usize], values: &[f64
 }
 
 /// The axes that vary between groups.
-fn varying(found: &[Vec<f64>]) -> Vec<usize> {
-    let axes = found.first().map_or(0, Vec::len);
-    (0..axes).filter(|&axis| found.iter().any(|group| group[axis] != found[0][axis])).collect()
+fn varying<'a>(groups: impl Iterator<Item = &'a Vec<f64>> + Clone) -> Vec<usize> {
+    let Some(first) = groups.clone().next() else { return Vec::new() };
+    (0..first.len()).filter(|&axis| groups.clone().any(|group| group[axis] != first[axis])).collect()
 }
 
-/// The indices of the shown groups, at most `most`: merged lines with some of the others at the first values of further axes, or sets of groups that
-/// differ in one axis alone, `series` or the last one, and so are comparable.
-fn choice(found: &[Vec<f64>], most: usize, makes: GroupRole, series: Option<usize>) -> Vec<usize> {
-    let varying = varying(found);
+/// The indices of the shown groups, at most `most`: sets of groups that differ in one axis alone, `series` or the last one, and so are comparable. An
+/// axis that merged lines do not have separates no sets.
+fn choice(found: &[Vec<f64>], most: usize, series: Option<usize>) -> Vec<usize> {
+    let varying = varying(found.iter());
     let fast = series.filter(|axis| varying.contains(axis)).or(varying.last().copied());
-    let is_merged = |group: &Vec<f64>| makes == GroupRole::Lines && group.iter().any(|value| value.is_nan());
-    if found.iter().any(is_merged) {
-        let is_further = |axis: &&usize| Some(**axis) != fast && !found.iter().any(|group| group[**axis].is_nan());
-        let further: Vec<usize> = varying.iter().filter(is_further).copied().collect();
-        let is_first = |place: &usize| further.iter().all(|&axis| found[*place][axis] == found[0][axis]);
-        let (mut places, others): (Vec<usize>, Vec<usize>) =
-            (0..found.len()).filter(is_first).partition(|&place| is_merged(&found[place]));
-        places.truncate(most);
-        places.extend(chosen(others.len(), most - places.len()).into_iter().map(|place| others[place]));
-        places.sort_unstable();
-        return places;
-    }
-    let rest = |place: usize| -> Vec<u64> {
-        let axes = (0..found[place].len()).filter(|axis| Some(*axis) != fast);
-        axes.map(|axis| found[place][axis].to_bits()).collect()
-    };
+    let is_common = |axis: &usize| Some(*axis) != fast && found.iter().all(|group| !group[*axis].is_nan());
+    let common: Vec<usize> = varying.into_iter().filter(is_common).collect();
     let mut sets: IndexMap<Vec<u64>, Vec<usize>> = IndexMap::new();
-    (0..found.len()).for_each(|place| sets.entry(rest(place)).or_default().push(place));
+    for (place, group) in found.iter().enumerate() {
+        sets.entry(common.iter().map(|&axis| group[axis].to_bits()).collect()).or_default().push(place);
+    }
     if sets.values().all(|set| set.len() == 1) {
         // Axes that advance together.
         sets = IndexMap::from([(Vec::new(), (0..found.len()).collect())]);
@@ -522,8 +521,7 @@ mod tests {
         }
         let friction = [10.0, 20.0, 30.0].map(|v_f| [1.1, 1.2].map(|tau| vec![3.0, v_f, tau]));
         found.extend(friction.into_iter().flatten());
-        let shown: Vec<&Vec<f64>> =
-            choice(&found, 7, GroupRole::Lines, Some(0)).into_iter().map(|place| &found[place]).collect();
+        let shown: Vec<&Vec<f64>> = choice(&found, 7, Some(0)).into_iter().map(|place| &found[place]).collect();
         assert!(shown.len() == 4 && shown.iter().all(|group| group[1] == 10.0), "{shown:?}");
         assert_eq!(shown.iter().filter(|group| group[0] == 3.0).count(), 2);
     }

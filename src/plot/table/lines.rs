@@ -28,7 +28,7 @@ pub struct LineColumns {
     pub x: String,
     /// Columns of the panels, from the top.
     pub y: Vec<String>,
-    /// The axis that distinguishes lines first, or the label that distinguishes dots.
+    /// The axis or label that distinguishes lines first, or dots.
     pub series: Option<String>,
     /// Whether rows are dots with a symbol for each value of `series`.
     pub has_symbols: bool,
@@ -43,8 +43,6 @@ pub struct LineFigure {
     pub groups: Groups,
     /// For each line, the first line with which it coincides; only that one is drawn.
     pub leaders: Vec<usize>,
-    /// The range of the horizontal axis.
-    pub x: Scale,
 }
 
 /// The rows of a table along the horizontal axis, by group.
@@ -69,8 +67,8 @@ struct Line {
 struct Graph {
     panel: Panel,
     curves: Vec<Vec<(f64, f64)>>,
-    /// The only value of the column.
-    constant: Option<f64>,
+    /// The column as an equation, if it is constant.
+    constant: Option<String>,
     /// Whether values are below the logarithmic axis.
     is_cut: bool,
 }
@@ -112,12 +110,12 @@ pub fn lines(filtered: &FilteredTable, plan: &LineColumns) -> Result<LineFigure,
     }
     let mut figure = Figure { columns: 1, ..rows.groups.figure(0.0) };
     figure.aspect = ASPECTS[usize::from(plan.y.len() > 1)];
-    let words = rows.groups.held.iter().cloned().chain(stated.iter().filter_map(Graph::equation));
+    let words = rows.groups.held.iter().cloned().chain(stated.into_iter().filter_map(|graph| graph.constant));
     figure.subtitle = words.collect::<Vec<_>>().join(", ");
     figure.legend = rows.legend(&drawn, &leaders);
     figure.notes.extend(notes);
     figure.panels = drawn.into_iter().map(|graph| rows.draw(graph, &leaders)).collect();
-    Ok(LineFigure { figure, groups: rows.groups, leaders, x })
+    Ok(LineFigure { figure, groups: rows.groups, leaders })
 }
 
 /// Whether a panel shows the gaps of families, which have a logarithmic scale: gaps of steps that do not reach the final state are negative, the
@@ -132,15 +130,15 @@ impl Rows {
         let axis = filtered.axis(&plan.x).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing)?;
         let series = plan.series.as_deref();
         let of_symbols = series.filter(|_| plan.has_symbols);
-        let over: Vec<&str> = [&plan.x]
-            .into_iter()
-            .map(String::as_str)
-            .chain(of_symbols.filter(|name| !filtered.is_label(name)))
-            .collect();
+        let of_axis = of_symbols.filter(|name| !filtered.is_label(name));
+        let over: Vec<&str> = [plan.x.as_str()].into_iter().chain(of_axis).collect();
         let makes = if plan.has_symbols { GroupRole::Symbols } else { GroupRole::Lines };
         let (mut further, along) = groups::further(filtered, &over, makes)?;
         let are_scattered = plan.has_symbols || groups::is_scattered(filtered, &plan.x, &further)?;
-        further.extend(of_symbols);
+        // A label distinguishes lines also where the axes of its points do not. Scattered points have names instead.
+        further.extend(
+            series.filter(|name| plan.has_symbols || !are_scattered && filtered.label_columns().contains(name)),
+        );
         further.sort_by_key(|name| Some(*name) != series);
         let first = further.first().copied().filter(|name| Some(*name) == series);
         let drawn: Vec<&str> = plan.y.iter().map(String::as_str).collect();
@@ -153,12 +151,9 @@ impl Rows {
         let ranges = vec![vec![(f64::NAN, f64::NAN); positions.len()]; plan.y.len()];
         let line = |_| Line { positions: positions.clone(), ranges: ranges.clone(), names: Vec::new() };
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
-        let columns = [&plan.x].into_iter().chain(&plan.y).chain(&groups.axes).map(String::as_str);
-        let columns: Vec<&str> = columns.chain(labels.iter().copied()).collect();
-        filtered.each(&columns, |row| {
-            let (values, rest) = row[1..].split_at(plan.y.len());
-            let (group, named) = rest.split_at(groups.axes.len());
-            let (Some(group), Some(mut place)) = (groups.place(group), cells.place(row[0])) else { return };
+        groups.each(filtered, &[&[plan.x.as_str()], &drawn[..], &labels].concat(), |group, row| {
+            let (values, named) = row[1..].split_at(plan.y.len());
+            let Some(mut place) = cells.place(row[0]) else { return };
             let line = &mut lines[group];
             if has_row_each {
                 place = line.positions.len();
@@ -191,10 +186,12 @@ impl Rows {
         let scale = if scale.low == 0.0 && scale.high == 0.0 { Scale { high: 1.0, ..scale } } else { scale };
         let axis = |column: &str, scale| Axis::new(column, &filtered.unit(column), scale);
         let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(MARK_ROOM[1])));
+        let (low, high) = range(self.values(panel));
+        let is_constant = high - low <= CONSTANT_RTOL * low.abs().max(high.abs());
         Some(Graph {
+            constant: is_constant.then(|| label::equation(&y.column, &label::number(low), &y.unit)),
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
             curves: self.lines.iter().map(|line| line.curve(panel)).collect(),
-            constant: constant(self.values(panel)),
             is_cut: !is_log && scale.log && self.values(panel).any(|value| value < scale.low),
         })
     }
@@ -249,15 +246,15 @@ impl Rows {
 
     fn legend(&self, graphs: &[Graph], leaders: &[usize]) -> Vec<Entry> {
         let series = self.series();
-        // Each name once, at its first line.
-        let firsts: Vec<usize> = (0..series.len()).filter(|&line| !series[..line].contains(&series[line])).collect();
-        let names: Vec<&str> = firsts.iter().map(|&line| self.groups.shown[line].name.as_str()).collect();
-        let is_drawn = |name: usize| (0..series.len()).any(|line| series[line] == name && leaders[line] == line);
-        let leader = |(name, &line)| if is_drawn(name) { name } else { series[leaders[line]] };
-        let leaders: Vec<usize> = firsts.iter().enumerate().map(leader).collect();
+        // Each name once, at its first line that is drawn, if there is one.
+        let mut lines: Vec<usize> = (0..series.len()).collect();
+        lines.sort_by_key(|&line| (series[line], leaders[line] != line));
+        lines.dedup_by_key(|line| series[*line]);
+        let names: Vec<&str> = lines.iter().map(|&line| self.groups.shown[line].name.as_str()).collect();
+        let leaders: Vec<usize> = lines.iter().map(|&line| series[leaders[line]]).collect();
         Entry::of_series(&names, &leaders, |place| match self.are_scattered {
             true => Key::Mark(Symbol::of_series(place)),
-            false => Key::series(place, graphs.iter().any(|graph| self.is_marked(&graph.curves[firsts[place]]))),
+            false => Key::series(place, graphs.iter().any(|graph| self.is_marked(&graph.curves[lines[place]]))),
         })
     }
 }
@@ -274,18 +271,4 @@ impl Line {
         }
         points
     }
-}
-
-impl Graph {
-    /// The column as an equation, if it is constant.
-    fn equation(&self) -> Option<String> {
-        let Axis { column, unit, .. } = &self.panel.y;
-        Some(label::equation(column, &label::number(self.constant?), unit))
-    }
-}
-
-/// The common value, if all values are equal.
-fn constant(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (low, high) = range(values);
-    (high - low <= CONSTANT_RTOL * low.abs().max(high.abs())).then_some(low)
 }

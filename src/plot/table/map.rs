@@ -14,9 +14,8 @@ use crate::plot::{PlotError, label};
 use crate::protocol::Status;
 use crate::table::STATUS;
 
-/// Greatest number of cells along an axis of a single panel, and of one of several panels. Chosen: finer cells are invisible in print.
+/// Greatest number of cells along an axis of a single panel, and two thirds of it of one of several. Chosen: finer cells are invisible in print.
 const MAX_CELLS: usize = 720;
-const MAX_CELLS_OF_SEVERAL: usize = 480;
 
 /// Filled fraction below which a map is sparse. Chosen: half of the fraction that a condition such as `v_f > v_i` leaves of a grid.
 const SPARSE_FILL: f64 = 0.25;
@@ -70,6 +69,8 @@ struct PanelCells {
     /// The positions and names of scattered rows, which are drawn as dots instead of cells.
     dots: Vec<((f64, f64), String)>,
     least: Option<(f64, f64, f64)>,
+    /// Whether a cell has several rows.
+    has_several: bool,
 }
 
 /// The raster of a panel: positions of its rows.
@@ -115,15 +116,24 @@ pub fn map(filtered: &FilteredTable, plan: &MapColumns) -> Result<MapFigure, Plo
         let least = label::number(filtered.least_gap);
         format!("Gaps below rtol = {least}, which are rounding, have the darkest colour.")
     });
-    figure.colours = shading.colours;
     let unbounded = |name: &&String| filtered.axis(name).is_some_and(|axis| axis.infinite);
     let unbounded = [&plan.x, &plan.y].into_iter().find(unbounded);
     let unbounded = unbounded.map(|name| format!("Rows with {} = ∞ have no place in the map.", label::name(name)));
-    figure.notes.extend(unbounded.into_iter().chain(raster.note(plan)).chain(rounding));
+    let blank = sheets.iter().any(|sheet| !sheet.has_rows()).then(|| "Blank panels have no rows.".to_owned());
+    let several = raster.note(plan, &sheets, &shading);
+    figure.notes.extend([unbounded, several, rounding, blank].into_iter().flatten());
+    figure.colours = shading.colours;
     let least = sheets.iter().map(|sheet| sheet.least.map(|(x, y, _)| (x, y))).collect();
     let is_signed = figure.colours.is_some() && plan.value != "gap" && !raster.are_dots;
     let values = sheets.into_iter().filter(|_| is_signed).map(|sheet| sheet.value).collect();
     Ok(MapFigure { figure, groups, least, cells: raster.cells, values })
+}
+
+impl PanelCells {
+    /// Whether it has rows; else the panel is blank.
+    fn has_rows(&self) -> bool {
+        self.status.iter().any(|status| *status != 0)
+    }
 }
 
 impl MapFigure {
@@ -154,7 +164,7 @@ impl Raster {
     fn new(filtered: &FilteredTable, plan: &MapColumns, groups: &Groups) -> Result<Raster, PlotError> {
         let axis = |name| filtered.axis(name).filter(|axis| !axis.values.is_empty()).ok_or(PlotError::Nothing);
         let axes = [axis(&plan.x)?, axis(&plan.y)?];
-        let most = if groups.shown.len() > 1 { MAX_CELLS_OF_SEVERAL } else { MAX_CELLS };
+        let most = if groups.shown.len() > 1 { 2 * MAX_CELLS / 3 } else { MAX_CELLS };
         // Scattered rows, such as those of a sampled design, are dots; if there are too many, several fall in one cell.
         let per_panel = filtered.rows as f64 / groups.all as f64;
         let is_sparse = SPARSE_FILL * (axes[0].values.len() * axes[1].values.len()) as f64 > per_panel
@@ -177,20 +187,19 @@ impl Raster {
     fn read(&self, filtered: &FilteredTable, plan: &MapColumns, groups: &Groups) -> Result<Vec<PanelCells>, PlotError> {
         let [columns, rows] = self.cells.each_ref().map(AxisCells::len);
         let count = if self.are_dots { 0 } else { columns * rows };
-        let empty =
-            |_| PanelCells { value: vec![f64::NAN; count], status: vec![0; count], dots: Vec::new(), least: None };
+        let empty = |_| PanelCells {
+            value: vec![f64::NAN; count],
+            status: vec![0; count],
+            dots: Vec::new(),
+            least: None,
+            has_several: false,
+        };
         let mut sheets: Vec<PanelCells> = groups.shown.iter().map(empty).collect();
         let labels = if self.are_dots { filtered.names_of_dots(Some(&plan.value))? } else { Vec::new() };
-        let axes: Vec<&str> = groups.axes.iter().map(String::as_str).collect();
-        let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &axes[..], &labels].concat();
-        filtered.each(&wanted, |row| {
-            let &[x, y, found, status, ref rest @ ..] = row else { return };
-            let (key, named) = rest.split_at(axes.len());
-            let (Some(panel), Some(column), Some(line)) =
-                (groups.place(key), self.cells[0].place(x), self.cells[1].place(y))
-            else {
-                return;
-            };
+        let wanted = [&[plan.x.as_str(), &plan.y, &plan.value, STATUS], &labels[..]].concat();
+        groups.each(filtered, &wanted, |panel, row| {
+            let &[x, y, found, status, ref named @ ..] = row else { return };
+            let (Some(column), Some(line)) = (self.cells[0].place(x), self.cells[1].place(y)) else { return };
             let sheet = &mut sheets[panel];
             let mut cell = line * columns + column;
             if self.are_dots {
@@ -199,6 +208,7 @@ impl Raster {
                 sheet.value.push(f64::NAN);
                 sheet.status.push(0);
             }
+            sheet.has_several |= sheet.status[cell] != 0;
             // A cell with several rows shows the least value; NaN is above any number.
             if sheet.status[cell] == 0 || found < sheet.value[cell] || sheet.value[cell].is_nan() {
                 sheet.value[cell] = found;
@@ -214,8 +224,11 @@ impl Raster {
         Ok(sheets)
     }
 
-    /// The dots of a panel and their names, or its cells.
+    /// The dots of a panel and their names, or its cells; nothing without rows.
     fn layers(&self, sheet: &PanelCells, shading: &Shading<'_>) -> Vec<Layer> {
+        if !sheet.has_rows() {
+            return Vec::new();
+        }
         if self.are_dots {
             let dot = |((at, _), &value): (&((f64, f64), String), &f64)| {
                 let shape = if shading.words.is_empty() { 0 } else { shading.shade(value) };
@@ -229,14 +242,14 @@ impl Raster {
     }
 
     /// A note about cells with several rows.
-    fn note(&self, plan: &MapColumns) -> Option<String> {
-        let shared =
-            [&plan.x, &plan.y].into_iter().zip(&self.cells).filter(|(_, cells)| !cells.exact && !self.are_dots);
+    fn note(&self, plan: &MapColumns, sheets: &[PanelCells], shading: &Shading<'_>) -> Option<String> {
+        let shared = [&plan.x, &plan.y].into_iter().zip(&self.cells).filter(|(_, cells)| !cells.exact);
         let shared: Vec<String> =
             shared.map(|(name, cells)| format!("{} cells of {}", cells.len(), label::name(name))).collect();
-        (!shared.is_empty()).then(|| {
-            format!("Several rows fall into one cell ({}); the cell shows the least value.", shared.join(" and "))
-        })
+        let of = if shared.is_empty() { String::new() } else { format!(" ({})", shared.join(" and ")) };
+        let least = if shading.words.is_empty() { "the least value" } else { "the first word of the legend" };
+        let has_several = sheets.iter().any(|sheet| sheet.has_several);
+        has_several.then(|| format!("Several rows fall into one cell{of}; the cell shows {least}."))
     }
 }
 
@@ -287,6 +300,7 @@ impl Shading<'_> {
 
     /// Entries for the words that occur, and for cells or dots without a value.
     fn legend(&self, sheets: &[PanelCells], are_dots: bool) -> Vec<Entry> {
+        let sheets: Vec<&PanelCells> = sheets.iter().filter(|sheet| sheet.has_rows()).collect();
         let has =
             |wanted: &dyn Fn(f64) -> bool| sheets.iter().any(|sheet| sheet.value.iter().any(|value| wanted(*value)));
         let key = |colour: Option<[u8; 3]>, shape: usize| match colour {
@@ -299,7 +313,7 @@ impl Shading<'_> {
             let shade = self.shade(place);
             Entry { key: key(Some(class(shade)), shade), text: self.meaning(word) }
         });
-        let hole = || Entry { key: key(None, 0), text: nothing(sheets) };
+        let hole = || Entry { key: key(None, 0), text: nothing(&sheets) };
         let below = || Entry { key: key(Some(BELOW_ZERO), 0), text: "gap below 0".to_owned() };
         words.chain(has(&|value| self.is_below(value)).then(below)).chain(has(&f64::is_nan).then(hole)).collect()
     }
@@ -324,7 +338,7 @@ fn is_scattered(rows: u64, axes: [&Values; 2]) -> bool {
 }
 
 /// The name of a hatched region, from the status of its rows.
-fn nothing(sheets: &[PanelCells]) -> String {
+fn nothing(sheets: &[&PanelCells]) -> String {
     let mut seen = [false; Status::ALL.len() + 1];
     for sheet in sheets {
         for (value, &status) in sheet.value.iter().zip(&sheet.status) {

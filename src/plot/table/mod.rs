@@ -110,7 +110,7 @@ const OWN_DRAWING: TablePicture =
 const TABLE_PICTURES: [TablePicture; 13] = [
     TablePicture {
         table: "gap",
-        title: "Work gap of the cubic shortcuts",
+        title: "Landscape of cubic shortcuts",
         x: &["alpha_2", "alpha_3", "t_f"],
         y: &["alpha_3"],
         value: &["gap", "work"],
@@ -137,7 +137,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "feedback",
-        title: "Optimal velocity by state and time left",
+        title: "Optimal feedback by state and time left",
         x: &["theta", "t_left", "v_ceiling", "tau_ceiling", "v_f", "b", "a"],
         y: &["t_left", "v_ceiling", "tau_ceiling", "v_f"],
         classes: &["arc"],
@@ -148,7 +148,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "crossover",
-        title: "Durations at which the optimal strategy changes",
+        title: "Changes of the optimal strategy",
         x: &["v_f", "v_i", "b", "a"],
         y: &["v_i", "b", "a"],
         value: &["t_cross", "t_floor", "t_cheapest", "t_turn", "t_min"],
@@ -206,7 +206,7 @@ const TABLE_PICTURES: [TablePicture; 13] = [
     },
     TablePicture {
         table: "gap_min",
-        title: "Least work gap of the cubic shortcuts",
+        title: "Best shortcut of a landscape",
         value: &["gap"],
         lines: &["gap", "alpha_2", "alpha_3", "v_min"],
         ..PROTOCOL_DEFAULTS
@@ -260,7 +260,7 @@ impl Source {
         let no_table = || PlotError::unknown("the dataset has no table", table, &self.tables());
         let picture = TABLE_PICTURES.iter().find(|picture| picture.table == table).ok_or_else(no_table)?;
         let is_default = request.x.is_none() && request.y.is_none() && request.colour.is_none();
-        let (mut figure, drawn) = match table {
+        let mut figure = match table {
             "gap_histogram" if is_default => reduced::histogram(&filtered)?,
             "gap_quantiles" if is_default => reduced::quantiles(&filtered)?,
             _ => {
@@ -270,16 +270,12 @@ impl Source {
                 {
                     filtered.keep_label(label);
                 }
-                let drawn = match &shape {
-                    Shape::Map(plan) => vec![plan.x.clone(), plan.y.clone()],
-                    Shape::Lines(plan) => vec![plan.x.clone()],
-                };
-                (TableScene { source: self, filtered: &filtered }.draw(&shape)?, drawn)
+                TableScene { source: self, filtered: &filtered }.draw(&shape)?
             }
         };
         figure.title = picture.title.to_owned();
         let model = self.model(table).to_owned();
-        let same = [fixed(&filtered, &drawn), figure.subtitle, model].into_iter().filter(|words| !words.is_empty());
+        let same = [fixed(&filtered), figure.subtitle, model].into_iter().filter(|words| !words.is_empty());
         figure.subtitle = same.collect::<Vec<_>>().join(", ");
         if let Some((drawn, hidden)) = front {
             figure.remarks.push(format!("rows of {drawn} alone; draw those of {hidden} with --x {hidden}"));
@@ -312,9 +308,9 @@ fn front(filtered: &FilteredTable, request: &Request) -> Result<Option<(&'static
 }
 
 /// The labels and values common to all rows.
-fn fixed(filtered: &FilteredTable, drawn: &[String]) -> String {
+fn fixed(filtered: &FilteredTable) -> String {
     let mut words: Vec<String> = filtered.common_labels.iter().map(|(_, word)| label::literal(word)).collect();
-    for axis in filtered.axes.iter().filter(|axis| !drawn.contains(&axis.name)) {
+    for axis in &filtered.axes {
         match axis.values.as_slice() {
             [one] if !axis.infinite => words.push(axis.text_of(*one)),
             [] if axis.infinite && !CEILINGS.contains(&axis.name.as_str()) => {

@@ -6,7 +6,7 @@ use super::map::{self, MapFigure};
 use super::{CEILINGS, TableScene};
 use crate::model::{Law, Transition};
 use crate::plot::canvas::Stroke;
-use crate::plot::figure::{Entry, Key, Layer};
+use crate::plot::figure::{Entry, Key, Layer, Panel};
 use crate::plot::{colour, label};
 use crate::protocol::optimal::crossover::{self, Wanted};
 use crate::protocol::optimal::{self, Bounds};
@@ -235,9 +235,10 @@ pub fn marks(scene: &TableScene<'_>, plan: &lines::LineColumns, lined: &mut Line
         let colour = if count == 1 { "#555" } else { colour::series(group).colour };
         let stroke = Stroke { colour, width: 0.5, dashes: &[2.0, 1.5] };
         for (name, place) in marks_of(scene, &lined.groups, group, &plan.x) {
-            let place = place.map(|place| place * scene.size(&plan.x));
-            let Some(at) = place.filter(|at| (lined.x.low..=lined.x.high).contains(at)) else { continue };
-            for (place, panel) in lined.figure.panels.iter_mut().enumerate() {
+            let Some(at) = place.map(|place| place * scene.size(&plan.x)) else { continue };
+            let is_inside = |panel: &Panel| (panel.x.scale.low..=panel.x.scale.high).contains(&at);
+            let panels = lined.figure.panels.iter_mut().filter(|panel| is_inside(panel));
+            for (place, panel) in panels.enumerate() {
                 // The first panel labels the marks.
                 let words = if place == 0 { label::name(name) } else { String::new() };
                 panel.layers.push(Layer::Vertical(at, words, stroke));

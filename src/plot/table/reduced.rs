@@ -35,26 +35,16 @@ const BANDS: [(&str, &str, [u8; 3], &str); 2] =
 const CURVES: [(&str, &str, usize); 3] =
     [("gap_q50", "median", 0), ("gap_min", "least", 2), ("gap_max", "greatest", 1)];
 
-/// The columns of a reduced table, without the number of shortcuts.
-fn columns(filtered: &FilteredTable) -> Vec<&'static str> {
-    let names = table::find(&filtered.table).into_iter().flat_map(Table::columns).skip(1).map(|column| column.name);
-    names.filter(|name| filtered.has(name)).collect()
-}
-
 /// Histogram: numbers of shortcuts by decade of the gap.
-pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
-    let columns = columns(filtered);
+pub fn histogram(filtered: &FilteredTable) -> Result<Figure, PlotError> {
+    // The classes, without the number of shortcuts.
+    let names = table::find(&filtered.table).into_iter().flat_map(Table::columns).skip(1).map(|column| column.name);
+    let columns: Vec<&str> = names.filter(|name| filtered.has(name)).collect();
     let groups = Groups::of_panels(filtered, &[], &[])?;
-    let wanted: Vec<&str> = columns.iter().copied().chain(groups.axes.iter().map(String::as_str)).collect();
     let mut counts = vec![vec![0.0; columns.len()]; groups.shown.len()];
-    filtered.each(&wanted, |row| {
-        let (classes, key) = row.split_at(columns.len());
-        let Some(group) = groups.place(key) else { return };
+    groups.each(filtered, &columns, |group, row| {
         // Rows of one group are added.
-        counts[group]
-            .iter_mut()
-            .zip(classes)
-            .for_each(|(all, count)| *all += if count.is_nan() { 0.0 } else { *count });
+        counts[group].iter_mut().zip(row).for_each(|(all, count)| *all += if count.is_nan() { 0.0 } else { *count });
     })?;
     let edges = edges();
     if columns.len() < edges.len() {
@@ -84,7 +74,7 @@ pub fn histogram(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), Plot
     if last + 1 == edges.len() {
         figure.notes.push(format!("The last bar holds all gaps from {greatest} on."));
     }
-    Ok((figure, Vec::new()))
+    Ok(figure)
 }
 
 /// The edges of the classes: one decade each, also for the open first and last classes.
@@ -95,9 +85,8 @@ fn edges() -> Vec<(f64, f64)> {
 }
 
 /// Bands of the quantiles of the gap over an axis; for a single landscape, the fraction of its shortcuts over the gap.
-pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), PlotError> {
-    let has =
-        |name: &str, least: usize| filtered.axis(name).is_some_and(|axis| axis.many || axis.values.len() >= least);
+pub fn quantiles(filtered: &FilteredTable) -> Result<Figure, PlotError> {
+    let has = |name: &str, least: usize| filtered.axis(name).is_some_and(|axis| axis.values.len() >= least);
     let across = [3, 2].into_iter().find_map(|least| PROTOCOL_DEFAULTS.x.iter().find(|name| has(name, least)));
     let columns: Vec<(&str, f64)> = QUANTILES.into_iter().filter(|(name, _)| filtered.has(name)).collect();
     match across {
@@ -107,17 +96,16 @@ pub fn quantiles(filtered: &FilteredTable) -> Result<(Figure, Vec<String>), Plot
 }
 
 /// The quantiles over an axis; bands and curves of columns that were not written are left out.
-fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
+fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Result<Figure, PlotError> {
     let groups = Groups::of_panels(filtered, &[across], &[])?;
     let cells = AxisCells::new(filtered.axis(across).ok_or(PlotError::Nothing)?, MAX_POSITIONS);
     // For each group and column, the value at each position.
     let mut quantiles = vec![vec![vec![f64::NAN; cells.len()]; columns.len()]; groups.shown.len()];
     let names = columns.iter().map(|(name, _)| *name);
-    let wanted: Vec<&str> = [across].into_iter().chain(names).chain(groups.axes.iter().map(String::as_str)).collect();
-    filtered.each(&wanted, |row| {
-        let (found, key) = row[1..].split_at(columns.len());
-        let (Some(group), Some(place)) = (groups.place(key), cells.place(row[0])) else { return };
-        quantiles[group].iter_mut().zip(found).for_each(|(column, value)| column[place] = *value);
+    let wanted: Vec<&str> = [across].into_iter().chain(names).collect();
+    groups.each(filtered, &wanted, |group, row| {
+        let Some(place) = cells.place(row[0]) else { return };
+        quantiles[group].iter_mut().zip(&row[1..]).for_each(|(column, value)| column[place] = *value);
     })?;
     let all = quantiles.iter().flatten().flatten().copied();
     let y = Scale::of(all).ok_or(PlotError::Nothing)?.with_room(DOT_ROOM);
@@ -152,10 +140,10 @@ fn bands(filtered: &FilteredTable, across: &str, columns: &[(&str, f64)]) -> Res
     for (.., shade, text) in BANDS.into_iter().rev().filter(is_drawn) {
         figure.legend.push(entry(Key::Fill(shade), text));
     }
-    Ok((figure, vec![across.to_owned()]))
+    Ok(figure)
 }
 
-fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<(Figure, Vec<String>), PlotError> {
+fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<Figure, PlotError> {
     let names: Vec<&str> = columns.iter().map(|(name, _)| *name).collect();
     let mut points = Vec::new();
     filtered.each(&names, |row| {
@@ -170,5 +158,5 @@ fn distribution(filtered: &FilteredTable, columns: &[(&str, f64)]) -> Result<(Fi
         y: Axis::new("shortcuts of at most this gap", "%", y),
         layers: vec![Layer::Line(points.clone(), Stroke::solid("#000", 1.1)), Layer::marks(points, 0)],
     };
-    Ok((Figure { columns: 1, aspect: ASPECTS[0], panels: vec![panel], ..Figure::default() }, Vec::new()))
+    Ok(Figure { columns: 1, aspect: ASPECTS[0], panels: vec![panel], ..Figure::default() })
 }
