@@ -1,6 +1,7 @@
 //! The groups of a table: combinations of the axes that are not drawn in a panel. Each group makes a panel or a line.
 
 use std::cmp::Ordering;
+use std::collections::HashMap;
 
 use super::filtered::{FilteredTable, Values, bits};
 use indexmap::{IndexMap, IndexSet};
@@ -64,6 +65,8 @@ pub fn is_scattered(filtered: &FilteredTable, x: &str, further: &[&str]) -> Resu
 #[derive(Debug, Clone, Default)]
 pub struct Gridded {
     axes: Vec<String>,
+    /// Axes that differ between the blocks of a spec.
+    of_blocks: Vec<String>,
     /// Axes that change together.
     tied: Vec<Vec<String>>,
     /// All axes of a spec with a file of points.
@@ -74,6 +77,7 @@ impl Gridded {
     /// The grid axes of a spec.
     pub fn of(spec: &Spec) -> Gridded {
         let mut gridded = Gridded::default();
+        let mut firsts: HashMap<&str, &AxisSpec> = HashMap::new();
         for (_, BlockSpec { axes, zip, points, .. }) in spec.blocks() {
             if points.is_some() {
                 gridded.outside_file.get_or_insert_default().extend(axes.keys().cloned());
@@ -86,6 +90,8 @@ impl Gridded {
                     AxisSpec::Form(form) => form.linspace.is_some() || form.geomspace.is_some(),
                 };
                 gridded.axes.extend(is_range.then(|| name.clone()));
+                let differs = firsts.insert(name, axis).is_some_and(|before| before != axis);
+                gridded.of_blocks.extend(differs.then(|| name.clone()));
                 if let AxisSpec::Form(AxisForm { expr: Some(expression), .. }) = axis {
                     let words = expression.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned);
                     gridded.tied.push(words.chain([name.clone()]).collect());
@@ -112,7 +118,9 @@ impl Gridded {
         let is_tied = |tied: &Vec<String>| {
             tied.iter().any(|axis| axis == name) && tied.iter().any(|axis| drawn.contains(&axis.as_str()))
         };
-        self.has(name) && !self.tied.iter().any(is_tied)
+        // Along a grid axis, blocks are different lines.
+        let has_line = self.of_blocks.iter().any(|axis| axis == name) && drawn.iter().any(|axis| self.has(axis));
+        (self.has(name) || has_line) && !self.tied.iter().any(is_tied)
     }
 }
 

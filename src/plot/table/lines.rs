@@ -50,6 +50,8 @@ struct Rows {
     groups: Groups,
     cells: AxisCells,
     lines: Vec<Line>,
+    /// For each panel, whether a row has no value.
+    has_nulls: Vec<bool>,
     /// Whether rows are scattered points, such as materials, without lines between them.
     are_scattered: bool,
 }
@@ -151,6 +153,7 @@ impl Rows {
         let ranges = vec![vec![(f64::NAN, f64::NAN); positions.len()]; plan.y.len()];
         let line = |_| Line { positions: positions.clone(), ranges: ranges.clone(), names: Vec::new() };
         let mut lines: Vec<Line> = groups.shown.iter().map(line).collect();
+        let mut has_nulls = vec![false; plan.y.len()];
         groups.each(filtered, &[&[plan.x.as_str()], &drawn[..], &labels].concat(), |group, row| {
             let (values, named) = row[1..].split_at(plan.y.len());
             let Some(mut place) = cells.place(row[0]) else { return };
@@ -161,12 +164,13 @@ impl Rows {
                 line.ranges.iter_mut().for_each(|ranges| ranges.push((f64::NAN, f64::NAN)));
                 line.names.extend((!labels.is_empty()).then(|| filtered.label(&labels, named)));
             }
-            for (ranges, &value) in line.ranges.iter_mut().zip(values) {
+            for ((ranges, has_nulls), &value) in line.ranges.iter_mut().zip(&mut has_nulls).zip(values) {
+                *has_nulls |= value.is_nan();
                 let (low, high) = ranges[place];
                 ranges[place] = (low.min(value), high.max(value));
             }
         })?;
-        Ok(Rows { groups, cells, lines, are_scattered })
+        Ok(Rows { groups, cells, lines, has_nulls, are_scattered })
     }
 
     /// The finite values of a panel.
@@ -187,7 +191,7 @@ impl Rows {
         let axis = |column: &str, scale| Axis::new(column, &filtered.unit(column), scale);
         let (x, y) = (axis(&plan.x, x), axis(&plan.y[panel], scale.with_room(MARK_ROOM[1])));
         let (low, high) = range(self.values(panel));
-        let is_constant = high - low <= CONSTANT_RTOL * low.abs().max(high.abs());
+        let is_constant = !self.has_nulls[panel] && high - low <= CONSTANT_RTOL * low.abs().max(high.abs());
         Some(Graph {
             constant: is_constant.then(|| label::equation(&y.column, &label::number(low), &y.unit)),
             panel: Panel { title: String::new(), x, y, layers: Vec::new() },
