@@ -126,11 +126,13 @@ impl<'a> Choice<'a> {
         Ok(Choice { filtered, defaults, request, varying: filtered.axes.iter().filter(|axis| axis.varies()).collect() })
     }
 
-    /// The first of `names`, except `not`, with at least `least` values.
+    /// The first of `names`, except `not`, with at least `least` values. Grid axes are preferred to computed ones.
     fn find(&self, names: &[&str], not: Option<&str>, least: usize) -> Option<String> {
         let fits = |axis: &&&Values| Some(axis.name.as_str()) != not && axis.values.len() >= least;
         let named = |name: &&str| self.varying.iter().filter(fits).find(|axis| axis.name == *name);
-        Some(names.iter().find_map(named)?.name.clone())
+        let (gridded, computed): (Vec<&str>, Vec<&str>) =
+            names.iter().partition(|name| self.filtered.gridded.has(name));
+        Some(gridded.iter().chain(&computed).find_map(named)?.name.clone())
     }
 
     /// The axis of numbers with the most values.
@@ -207,18 +209,14 @@ impl<'a> Choice<'a> {
         let alike = Choice { varying: alike, ..*self };
         let first = self.request.x.clone().or_else(|| alike.find(defaults.x, None, least));
         let Some(first) = first.filter(|_| least < usize::MAX) else { return Ok(None) };
-        // An axis that changes only with the first one would make a map of a single line. Grid axes are preferred to computed ones.
-        let others = [defaults.y, defaults.x].concat();
-        let (gridded, computed): (Vec<&str>, Vec<&str>) =
-            others.into_iter().partition(|name| filtered.gridded.has(name));
-        for second in [gridded, computed].concat() {
-            if let Some(second) = alike.find(&[second], Some(&first), least)
-                && !filtered.follows(&second, &first)?
-            {
-                return Ok(Some((first, second)));
+        // An axis that changes only with the first one would make a map of a single line.
+        let mut others = Vec::new();
+        for name in [defaults.y, defaults.x].concat() {
+            if filtered.axis(name).is_some_and(Values::varies) && !filtered.follows(name, &first)? {
+                others.push(name);
             }
         }
-        Ok(None)
+        Ok(alike.find(&others, Some(&first), least).map(|second| (first, second)))
     }
 
     fn map(&self, x: String, y: String) -> Result<Shape, PlotError> {

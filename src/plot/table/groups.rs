@@ -77,7 +77,7 @@ impl Gridded {
     /// The grid axes of a spec.
     pub fn of(spec: &Spec) -> Gridded {
         let mut gridded = Gridded::default();
-        let mut firsts: HashMap<&str, &AxisSpec> = HashMap::new();
+        let mut previous: HashMap<&str, &AxisSpec> = HashMap::new();
         for (_, BlockSpec { axes, zip, points, .. }) in spec.blocks() {
             if points.is_some() {
                 gridded.outside_file.get_or_insert_default().extend(axes.keys().cloned());
@@ -90,7 +90,7 @@ impl Gridded {
                     AxisSpec::Form(form) => form.linspace.is_some() || form.geomspace.is_some(),
                 };
                 gridded.axes.extend(is_range.then(|| name.clone()));
-                let differs = firsts.insert(name, axis).is_some_and(|before| before != axis);
+                let differs = previous.insert(name, axis).is_some_and(|before| before != axis);
                 gridded.of_blocks.extend(differs.then(|| name.clone()));
                 if let AxisSpec::Form(AxisForm { expr: Some(expression), .. }) = axis {
                     let words = expression.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned);
