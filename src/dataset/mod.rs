@@ -25,6 +25,8 @@ mod survey;
 
 pub use batch::batch;
 pub use cell::Cell;
+#[cfg(feature = "read")]
+pub(crate) use cell::first_row;
 pub use folder::{DatasetError, Folder, MANIFEST};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]

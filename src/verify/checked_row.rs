@@ -5,7 +5,7 @@ use crate::model::{Friction, Law, StateLaw, Transition};
 use crate::protocol::SpringBlock;
 use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::Case;
-use crate::table::STATUS;
+use crate::table::{STATUS, Table};
 use crate::trace::{Pathless, Protocol, protocol_of};
 
 /// The context of a check: properties of the sweep.
@@ -178,6 +178,18 @@ impl<'a> CheckedRow<'a> {
             None => "nothing".to_owned(),
         };
         self.differences.push(Difference { column, size, expected });
+    }
+
+    /// Compares the results of a row of `table` with those of the row computed `again`, which has no difference.
+    pub fn compare_again(&mut self, table: &Table, again: &Row) {
+        for column in table.columns().iter().map(|column| column.name).chain([STATUS]) {
+            match again.iter().find(|(name, _)| name == column) {
+                Some((_, Cell::Number(number))) => self.compare(column, *number),
+                Some((_, Cell::Word(word))) => self.compare_word(column, word),
+                Some((_, Cell::Missing)) => self.compare(column, None),
+                None => {}
+            }
+        }
     }
 
     /// Compares a number, if there is one.

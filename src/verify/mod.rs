@@ -1,5 +1,6 @@
-//! Audit of a dataset: a sample of its rows is checked by the equations that their protocols obey, or solved by a second route.
+//! Audit of a dataset: a sample of its rows is computed again, and checked by the equations that their protocols obey, or solved by a second route.
 
+mod again;
 mod checked_row;
 mod crossover;
 mod feedback;
@@ -17,6 +18,7 @@ mod step_response;
 mod task;
 mod units;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use indexmap::IndexMap;
@@ -24,7 +26,8 @@ use indexmap::IndexMap;
 use crate::dataset::{Folder, Manifest, ManifestTable, Row, frame};
 use crate::model::{Friction, Units};
 use crate::sweep::{self, Spec};
-use crate::table;
+use crate::table::{self, Table};
+use again::again;
 use checked_row::{Checked, CheckedRow, Context, Difference};
 use sample::Sample;
 pub(crate) use units::scale;
@@ -97,16 +100,10 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
     let folder = Folder::at(path);
     let mut audits = Vec::new();
     for table in &manifest.tables {
-        let definition = table::find(&table.name);
         let reduced = table::REDUCED.iter().find(|(_, known)| known.name() == table.name).map(|(word, _)| *word);
         let rtol = spec.rtol_of(&table.name);
-        let Sample { mut rows, missing, fault } = sample::rows(&folder, manifest, table, sample, seed);
-        let relative = relative(&folder, table);
-        let context = Context { bounded, friction, relative, rtol };
-        // Reduced rows are compared as they were written.
-        if let Some(table) = definition.filter(|_| reduced.is_none()) {
-            rows.iter_mut().for_each(|(_, row)| scale(row, table, &units, relative));
-        }
+        let Sample { rows, missing, fault } = sample::rows(&folder, manifest, table, sample, seed);
+        let context = Context { bounded, friction, relative: relative(&folder, table), rtol };
         let mut audit = Audit {
             table: table.name.clone(),
             rtol,
@@ -117,25 +114,9 @@ pub fn verify(path: &Path, manifest: &Manifest, sample: u64, seed: u64) -> Resul
             unchecked: IndexMap::new(),
             fault,
         };
-        let check = |row: &mut CheckedRow<'_>| match table.name.as_str() {
-            "gap" => shortcut::gap(row),
-            "optimal" => optimal::check(row),
-            "feedback" => feedback::check(row),
-            "crossover" => crossover::check(row),
-            "best_cubic" => shortcut::best_cubic(row),
-            "shortcut" => shortcut::shortcut(row),
-            "compliant" => shortcut::compliant(row),
-            "regularised" => shortcut::regularised(row),
-            "step_response" => step_response::check(row),
-            "stability" => stability::check(row),
-            _ => match reduced {
-                Some(word) => reduced::check(row, word, &units, &spec),
-                None => Err("there is no independent route for this table"),
-            },
-        };
+        let auditor = Auditor { spec: &spec, units: &units, table: table::find(&table.name), reduced, context };
         for (number, row) in rows {
-            let CheckedRow { differences, unchecked, .. } = CheckedRow::new(&row, context, check);
-            audit.add(number, &row, differences, unchecked);
+            auditor.add(&mut audit, number, row);
         }
         audits.push(audit.finished(missing));
     }
@@ -157,6 +138,61 @@ pub(crate) fn relative(folder: &Folder, table: &ManifestTable) -> [bool; 2] {
         .map(|name| headings.iter().any(|heading| heading.name == name && heading.unit.contains("t_f")))
 }
 
+/// Checks the rows of a table of a sweep.
+struct Auditor<'a> {
+    spec: &'a Spec,
+    units: &'a Units,
+    table: Option<&'static Table>,
+    /// The word of the reduction that writes the table.
+    reduced: Option<&'static str>,
+    context: Context,
+}
+
+/// Why rows of an unknown table are not checked.
+const UNKNOWN: &str = "there is no independent route for this table";
+
+impl Auditor<'_> {
+    /// Checks a row by equations that do not depend on its table.
+    fn check(&self, row: &mut CheckedRow<'_>) -> Checked {
+        match self.table.map_or("", Table::name) {
+            "gap" => shortcut::gap(row),
+            "optimal" => optimal::check(row),
+            "feedback" => feedback::check(row),
+            "crossover" => crossover::check(row),
+            "best_cubic" => shortcut::best_cubic(row),
+            "shortcut" => shortcut::shortcut(row),
+            "compliant" => shortcut::compliant(row),
+            "regularised" => shortcut::regularised(row),
+            "step_response" => step_response::check(row),
+            "stability" => stability::check(row),
+            _ if self.reduced.is_some() => reduced::check(row, self.units, self.spec),
+            _ => Err(UNKNOWN),
+        }
+    }
+
+    /// Adds a row, compared with itself computed again, and checked.
+    fn add(&self, audit: &mut Audit, number: u64, mut row: Row) {
+        let written = CheckedRow::new(&row, self.context, |_| Ok(()));
+        let mut again = self.table.ok_or(UNKNOWN).and_then(|table| again(&written, table, self.reduced, self.spec));
+        // Reduced rows are compared as they were written.
+        if let Some(table) = self.table.filter(|_| self.reduced.is_none()) {
+            let rows = [Some(&mut row), again.as_mut().ok()].into_iter().flatten();
+            rows.for_each(|row| scale(row, table, self.units, self.context.relative));
+        }
+        let mut found = CheckedRow::new(&row, self.context, |row| self.check(row));
+        let extent = if found.differences.is_empty() { Extent::Whole } else { Extent::Part };
+        match again.and_then(|again| Ok((self.table.ok_or(UNKNOWN)?, again))) {
+            Ok((table, again)) => found.compare_again(table, &again),
+            Err(reason) => found.miss(reason),
+        }
+        let CheckedRow { differences, unchecked, .. } = found;
+        for reason in unchecked {
+            *audit.unchecked.entry((reason, extent)).or_default() += 1;
+        }
+        audit.compare(number, &row, differences);
+    }
+}
+
 impl Audit {
     /// The audit of a table of which so many rows of the sample are missing.
     fn finished(mut self, missing: u64) -> Audit {
@@ -167,14 +203,14 @@ impl Audit {
         self
     }
 
-    fn add(&mut self, number: u64, row: &Row, differences: Vec<Difference>, unchecked: Vec<&'static str>) {
-        let extent = if differences.is_empty() { Extent::Whole } else { Extent::Part };
-        for reason in unchecked {
-            *self.unchecked.entry((reason, extent)).or_default() += 1;
-        }
+    /// Adds the comparisons of a row. A column with several errors counts once.
+    fn compare(&mut self, number: u64, row: &Row, differences: Vec<Difference>) {
+        let mut failing = BTreeSet::new();
         for Difference { column, size, expected } in differences {
             let difference = size / self.rtol;
-            self.errors += usize::from(difference > MAX_DIFFERENCE_RTOLS);
+            if difference > MAX_DIFFERENCE_RTOLS {
+                failing.insert(column);
+            }
             let known = self.worst.iter().position(|known| known.column == column);
             if known.is_some_and(|place| difference <= self.worst[place].difference) {
                 continue;
@@ -185,5 +221,6 @@ impl Audit {
                 None => self.worst.push(worst),
             }
         }
+        self.errors += failing.len();
     }
 }
