@@ -261,10 +261,11 @@ impl Optimum {
 }
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
-    if row.state_law()? != StateLaw::Ageing {
-        return relaxed::check(row);
+    let (task, state) = (Task::of(row)?, row.state_law()?);
+    if state != StateLaw::Ageing {
+        relaxed::certify(row, &task.problem, state, task.t_f);
+        return Ok(());
     }
-    let task = Task::of(row)?;
     let has_numbers = row.compare_feasible(task.is_feasible());
     task.compare_limits(row);
     if has_numbers && let Some(optimum) = row.certify(&task) {

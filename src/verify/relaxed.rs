@@ -1,19 +1,19 @@
-//! `optimal` for the laws of slip and of Perrin, Rice and Zheng: the arcs of the row, integrated from the equations, arrive with its work; the price
-//! of holding theta is least where the path turns or rests.
+//! The optimum for the laws of slip and of Perrin, Rice and Zheng: its arcs, integrated from the equations, arrive with its work; the price of holding
+//! theta is least where the path turns or rests.
 
-use super::checked_row::NEGATIVE;
+use super::CheckedRow;
 use super::motion::{bisect, lowest};
 use super::route::integrate;
-use super::{Checked, CheckedRow};
-use crate::dataset::{Cell, Row};
 use crate::model::{Law, StateLaw, Transition};
 use crate::numerics::{LONG_ROUNDING_RTOL, NEGLIGIBLE_LN};
-use crate::protocol::Solved;
-use crate::protocol::relaxed;
-use crate::table::STATUS;
+use crate::protocol::optimal::{Optimum, Strategy};
+use crate::protocol::relaxed::{self, Relaxed};
+use crate::protocol::{Solved, Status};
 
 /// Slip of the longest arc on the ceiling. Chosen: beyond, rounding of its end may decide the price there.
 const MAX_SLIP: f64 = 5000.0;
+
+const TOO_LONG: &str = "an arc is too long";
 
 /// Difference of `ln theta` at which a price is above its minimum. Chosen: a minimum is flat to half the digits.
 const PRICE_STEP: f64 = 1e-4;
@@ -31,16 +31,6 @@ struct Arc {
     end: f64,
     work: f64,
     by_b: f64,
-}
-
-/// The numbers of a row that determine its arcs.
-struct Arcs {
-    t_f: f64,
-    floor: f64,
-    fast: f64,
-    hamiltonian: f64,
-    /// `ln theta` at both ends.
-    ends: [f64; 2],
 }
 
 impl Block {
@@ -79,16 +69,33 @@ impl Block {
         duty * fast.1 + (1.0 - duty) * slow.1
     }
 
-    /// Compares the derivatives of the work with respect to both ends by the costate `(H - tau v)/theta'`.
-    fn compare_costates(&self, row: &mut CheckedRow<'_>, arcs: &Arcs) {
-        let [start, end] = arcs.ends;
-        for (column, sign, w, v) in [("dwork_dv_i", -1.0, start, "v_start"), ("dwork_dv_f", 1.0, end, "v_end")] {
-            let Some(v) = row.number(v) else { continue };
+    /// Compares the derivatives of the work with respect to the velocities of both `ends`, by the costate `(H - tau v)/theta'`.
+    fn compare_costates(&self, row: &mut CheckedRow<'_>, optimum: &Optimum, [start, end]: [f64; 2]) {
+        let Optimum { hamiltonian, v_start, v_end, .. } = *optimum;
+        for (column, sign, w, v) in [("dwork_dv_i", -1.0, start, v_start), ("dwork_dv_f", 1.0, end, v_end)] {
             let (theta, power) = (w.exp(), self.friction(w, v) * v);
             let rate = self.state.rate(theta * v) / (theta * theta);
-            let size = (arcs.hamiltonian.abs() + power.abs()) / rate.abs();
-            row.compare_number(column, sign * (arcs.hamiltonian - power) / rate, size);
+            let size = (hamiltonian.abs() + power.abs()) / rate.abs();
+            row.compare_number(column, sign * (hamiltonian - power) / rate, size);
         }
+    }
+
+    /// Whether the direct way, at `v = 1` or on the ceiling, takes longer than `t_f`; `None` if it is too long to integrate.
+    fn is_short(&self, &Transition { v_i, v_f, .. }: &Transition, t_f: f64) -> Option<bool> {
+        if v_f >= self.ceiling {
+            return Some(true);
+        }
+        let (start, end) = (-v_i.ln(), -v_f.ln());
+        if end > start && self.state == StateLaw::Slip && start < -1.0 {
+            // The fastest rise, v = 1/(e theta) up to theta = 1/e.
+            let (turn, capped) = (end.min(-1.0), -1.0 - self.ceiling.ln());
+            let on_ceiling = if start < capped { (capped - start + 1.0).ln() / self.ceiling } else { 0.0 };
+            let least = std::f64::consts::E * (turn.exp() - start.max(capped).exp()) + (turn / end).ln() + on_ceiling;
+            return Some(t_f < least * (1.0 + 1e-9));
+        }
+        let v = if end > start { 1.0 } else { self.ceiling };
+        let reached = self.follow(start, v, t_f)?.end;
+        Some(if end > start { reached < end + 1e-9 } else { reached > end - 1e-9 })
     }
 
     /// `ln u` of a rise at `w`, by bisection.
@@ -109,103 +116,92 @@ impl Block {
     }
 }
 
-/// Checks a row of a law other than ageing.
-pub fn check(row: &mut CheckedRow<'_>) -> Checked {
-    let (problem, t_f) = (row.transition()?, row.axis("t_f")?);
-    let block = Block { state: row.state_law()?, law: problem.law, ceiling: row.axis("v_ceiling")? };
-    if row.number("work").is_none() {
-        return infeasible(row, &block, &problem, t_f);
-    }
-    let needed = ["time_at_floor", "time_at_v_ceiling", "hamiltonian"].map(|column| row.number(column));
-    let ([Some(floor), Some(fast), Some(hamiltonian)], Some(strategy)) = (needed, row.word("strategy")) else {
-        return Err("columns of the arcs are not written");
-    };
-    let arcs = Arcs { t_f, floor, fast, hamiltonian, ends: [-problem.v_i.ln(), -problem.v_f.ln()] };
-    let done = match strategy {
-        "rise" => rise(row, &block, &arcs),
-        _ => bang_bang(row, &block, &arcs, strategy),
-    };
-    done.ok_or("an arc is too long, or columns of the chattering are not written")
-}
-
-/// The least work of a law other than ageing, confirmed by [`check`] as a difference of the column `optimum`.
+/// The least work of a law other than ageing. The error of its arcs is a difference of the column `optimum`; the numbers of a row of `optimal` that
+/// follow from them are compared, too.
 pub fn certify(row: &mut CheckedRow<'_>, problem: &Transition, state: StateLaw, t_f: f64) -> Solved<f64> {
-    let v_ceiling = row.bounds().v_ceiling;
-    let solved = relaxed::solve(state, problem, t_f, v_ceiling);
-    let optimum = solved.value.map(|found| found.optimum);
-    let chatter = solved.value.and_then(|found| found.chatter);
-    let numbers = [
-        ("a", Some(problem.law.a)),
-        ("b", Some(problem.law.b)),
-        ("v_i", Some(problem.v_i)),
-        ("v_f", Some(problem.v_f)),
-        ("t_f", Some(t_f)),
-        ("v_ceiling", Some(v_ceiling)),
-        ("work", optimum.map(|found| found.work)),
-        ("time_at_floor", optimum.map(|found| found.time_at_floor)),
-        ("time_at_v_ceiling", optimum.map(|found| found.time_at_v_ceiling)),
-        ("hamiltonian", optimum.map(|found| found.hamiltonian)),
-        ("chatter_time", chatter.map(|found| found.time)),
-        ("chatter_theta", chatter.map(|found| found.theta)),
-        ("chatter_duty", chatter.map(|found| found.duty)),
-    ];
-    let strategy = optimum.map_or("", |found| found.strategy.name());
-    let words = [("law", state.name()), ("strategy", strategy), (STATUS, solved.status.name())];
-    let numbers = numbers.into_iter().filter_map(|(name, number)| Some((name.to_owned(), Cell::Number(number?))));
-    let words = words.into_iter().map(|(name, word)| (name.to_owned(), Cell::Word(word.to_owned())));
-    let cells: Row = numbers.chain(words).collect();
-    let found = CheckedRow::new(&cells, row.context, check);
-    row.push("optimum", found.differences.iter().map(|difference| difference.size).fold(0.0, f64::max));
-    found.unchecked.into_iter().for_each(|reason| row.miss(reason));
+    let block = Block { state, law: problem.law, ceiling: row.bounds().v_ceiling };
+    let solved = relaxed::solve(state, problem, t_f, block.ceiling);
+    let ends = [-problem.v_i.ln(), -problem.v_f.ln()];
+    let error = match &solved.value {
+        None if solved.status != Status::Infeasible => Err("optima without a proof"),
+        None => block.is_short(problem, t_f).map(|is_short| if is_short { 0.0 } else { f64::INFINITY }).ok_or(TOO_LONG),
+        Some(found) if found.optimum.strategy == Strategy::Rise => {
+            rise(row, &block, &found.optimum, (ends, t_f)).ok_or(TOO_LONG)
+        }
+        Some(found) => bang_bang(row, &block, found, (ends, t_f), solved.status == Status::Ok).ok_or(TOO_LONG),
+    };
+    match error {
+        Ok(error) => row.push("optimum", error),
+        Err(reason) => row.miss(reason),
+    }
     solved.map(|found| found.optimum.work)
 }
 
-/// Compares a path of one arc on each bound, between which theta may rest while they alternate; `None` if the integrator fails or a column of the
-/// chattering is missing.
-fn bang_bang(row: &mut CheckedRow<'_>, block: &Block, arcs: &Arcs, strategy: &str) -> Option<()> {
-    let Arcs { t_f, floor, fast, ends: [start, end], .. } = *arcs;
-    let chatters = strategy == "chatter";
-    let [time, theta, duty] = ["chatter_time", "chatter_theta", "chatter_duty"]
-        .map(|column| if chatters { row.number(column) } else { Some(0.0) });
-    let (time, rest, duty) = (time?, theta?.ln(), duty?);
+/// Relative difference of a number from the expected one.
+fn apart(found: f64, expected: f64) -> f64 {
+    if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
+}
+
+/// The greatest of some errors; infinite if one is not a number.
+fn greatest(errors: &[f64]) -> f64 {
+    errors.iter().fold(0.0, |greatest, error| if error.is_nan() { f64::INFINITY } else { error.max(greatest) })
+}
+
+/// The error of a path of one arc on each bound, between which theta may rest while they alternate; `None` if the integrator fails.
+fn bang_bang(
+    row: &mut CheckedRow<'_>,
+    block: &Block,
+    &Relaxed { optimum, chatter }: &Relaxed,
+    (ends, t_f): ([f64; 2], f64),
+    is_proven: bool,
+) -> Option<f64> {
+    let Optimum { time_at_floor: floor, time_at_v_ceiling: fast, .. } = optimum;
+    let [start, end] = ends;
+    let (time, duty) = chatter.map_or((0.0, 0.0), |chatter| (chatter.time, chatter.duty));
     let [wait, jerk] = [(1.0, floor - time * (1.0 - duty)), (block.ceiling, fast - time * duty)];
     let toward = |from: f64, to: f64| if to > from { wait } else { jerk };
-    let [(v, t), (v_next, t_next)] = match strategy {
-        "chatter" => [toward(start, rest), toward(rest, end)],
-        "wait_jerk" => [wait, jerk],
-        _ => [jerk, wait],
+    let rest = chatter.map(|chatter| chatter.theta.ln());
+    let [(v, t), (v_next, t_next)] = match rest {
+        Some(rest) => [toward(start, rest), toward(rest, end)],
+        None if optimum.strategy == Strategy::WaitJerk => [wait, jerk],
+        None => [jerk, wait],
     };
     let first = block.follow(start, v, t)?;
-    let turn = if chatters { rest } else { first.end };
+    let turn = rest.unwrap_or(first.end);
     // The time of arcs at the same velocity is that of both.
     let is_one = v == v_next;
     let second = block.follow(turn, v_next, if is_one { 0.0 } else { t_next })?;
     let off = if is_one { first.end - end } else { (first.end - turn).abs() + (second.end - end).abs() };
-    row.push("time", ((floor + fast) / t_f - 1.0).abs());
-    row.push("theta_end", off.abs() / (1.0 + start.abs().max(end.abs())));
     let price = block.price(turn);
-    let (resting, resting_by_b) =
-        if chatters { (time * price, time * rest * (duty * block.ceiling + 1.0 - duty)) } else { (0.0, 0.0) };
-    row.compare("work", first.work + resting + second.work);
-    row.compare("hamiltonian", price);
+    let mean = duty * block.ceiling + 1.0 - duty;
+    let (resting, resting_by_b) = if chatter.is_some() { (time * price, time * turn * mean) } else { (0.0, 0.0) };
+    let work = first.work + resting + second.work;
     row.compare("dwork_da", fast * block.ceiling * block.ceiling.ln());
     // With the work of a steady slide at v = 1.
     let by_b = first.by_b + resting_by_b + second.by_b;
     row.compare_relative("dwork_db", by_b, by_b.abs() + t_f);
-    block.compare_costates(row, arcs);
-    if chatters {
+    block.compare_costates(row, &optimum, ends);
+    let dear = if chatter.is_some() {
         let around = [turn - PRICE_STEP, turn + PRICE_STEP].map(|w| block.price(w));
-        row.push("price", if around.iter().all(|other| *other > price) { 0.0 } else { f64::INFINITY });
-    } else if !row.has_status("unproven") && !row.has_status(NEGATIVE) {
+        if around.iter().all(|other| *other > price) { 0.0 } else { f64::INFINITY }
+    } else if is_proven {
         let least = |from: f64, to: f64| lowest(&|w| block.price(w), (from, to));
         let least = least(start, turn).min(least(turn, end));
-        row.push("price", ((price - least) / price.abs()).max(0.0));
-    }
-    if chatters || fast > 0.0 && floor > 0.0 {
-        let around: &[f64] = if chatters { &[1.0, block.ceiling] } else { &[] };
+        ((price - least) / price.abs()).max(0.0)
+    } else {
+        0.0
+    };
+    if chatter.is_some() || fast > 0.0 && floor > 0.0 {
+        let around: &[f64] = if chatter.is_some() { &[1.0, block.ceiling] } else { &[] };
         compare_extremes(row, block, [(v, start, turn), (v_next, turn, end)], around);
     }
-    Some(())
+    Some(greatest(&[
+        apart(floor + fast, t_f),
+        off.abs() / (1.0 + start.abs().max(end.abs())),
+        apart(optimum.work, work),
+        apart(optimum.hamiltonian, price),
+        dear,
+    ]))
 }
 
 /// Compares velocities at the ends, greatest state and friction of two arcs, with their velocities and `ln theta` at their ends, and these
@@ -223,42 +219,16 @@ fn compare_extremes(row: &mut CheckedRow<'_>, block: &Block, arcs: [(f64, f64, f
     row.compare("friction_max", friction.fold(f64::NEG_INFINITY, f64::max));
 }
 
-/// Compares a path faster than at `v = 1`, which ends as long before the end as the time at `v = 1`; `None` if that is too long.
-fn rise(row: &mut CheckedRow<'_>, block: &Block, arcs: &Arcs) -> Option<()> {
-    let Arcs { t_f, floor, hamiltonian, ends: [start, end], .. } = *arcs;
+/// The error of a path faster than at `v = 1`, which ends as long before the end as the time at `v = 1`; `None` if that is too long.
+fn rise(row: &mut CheckedRow<'_>, block: &Block, optimum: &Optimum, (ends, t_f): ([f64; 2], f64)) -> Option<f64> {
+    let ([start, end], floor, hamiltonian) = (ends, optimum.time_at_floor, optimum.hamiltonian);
     let last = if floor > 0.0 { end * floor.exp() } else { end };
     let [time, work] = block.rise(start, last, -hamiltonian)?;
-    let wait = block.follow(last, 1.0, floor)?;
+    let work = work + block.follow(last, 1.0, floor)?.work;
     let velocity = |w: f64| (block.rise_ln_u(w, -hamiltonian) - w).exp();
-    row.push("time", ((time + floor) / t_f - 1.0).abs());
-    row.compare("work", work + wait.work);
     row.compare("theta_max", end.exp());
     row.compare("v_start", velocity(start));
     row.compare("v_end", if floor > 0.0 { 1.0 } else { velocity(end) });
-    block.compare_costates(row, arcs);
-    Some(())
-}
-
-/// Checks a row without numbers: the direct way, at `v = 1` or on the ceiling, takes longer than `t_f`.
-fn infeasible(row: &mut CheckedRow<'_>, block: &Block, problem: &Transition, t_f: f64) -> Checked {
-    if !row.has_status("infeasible") {
-        return Err("optima without a proof");
-    }
-    let (start, end) = (-problem.v_i.ln(), -problem.v_f.ln());
-    if problem.v_f >= block.ceiling {
-        return Ok(());
-    }
-    let is_short = if end > start && block.state == StateLaw::Slip && start < -1.0 {
-        // The fastest rise, v = 1/(e theta) up to theta = 1/e.
-        let (turn, capped) = (end.min(-1.0), -1.0 - block.ceiling.ln());
-        let on_ceiling = if start < capped { (capped - start + 1.0).ln() / block.ceiling } else { 0.0 };
-        let least = std::f64::consts::E * (turn.exp() - start.max(capped).exp()) + (turn / end).ln() + on_ceiling;
-        t_f < least * (1.0 + 1e-9)
-    } else {
-        let v = if end > start { 1.0 } else { block.ceiling };
-        let reached = block.follow(start, v, t_f).ok_or("an arc is too long")?.end;
-        if end > start { reached < end + 1e-9 } else { reached > end - 1e-9 }
-    };
-    row.push("t_least", if is_short { 0.0 } else { f64::INFINITY });
-    Ok(())
+    block.compare_costates(row, optimum, ends);
+    Some(greatest(&[apart(time + floor, t_f), apart(optimum.work, work)]))
 }
