@@ -71,11 +71,6 @@ impl<'a> CheckedRow<'a> {
         self.word(STATUS) == Some(name)
     }
 
-    /// Whether a column is written, and null.
-    pub fn is_missing(&self, column: &str) -> bool {
-        self.cell(column) == Some(&Cell::Missing)
-    }
-
     /// Whether a column with such a name is written.
     pub fn has_column(&self, start: &str) -> bool {
         self.cells.iter().any(|(name, _)| name.starts_with(start))
@@ -209,13 +204,6 @@ impl<'a> CheckedRow<'a> {
     pub fn judge(&mut self, column: &'static str, holds: bool, expected: &str) {
         let size = if holds { 0.0 } else { f64::INFINITY };
         self.differences.push(Difference { column, size, expected: expected.to_owned() });
-    }
-
-    /// Records an error if a column that must have a value is null, or the reverse.
-    pub fn demand(&mut self, column: &'static str, exists: bool) {
-        if self.cells.iter().any(|(name, cell)| name == column && (*cell != Cell::Missing) != exists) {
-            self.judge(column, false, if exists { "a number" } else { "nothing" });
-        }
     }
 
     /// Compares whether the status reports friction below 0 with the least friction along the path.

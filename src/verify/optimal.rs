@@ -202,8 +202,8 @@ impl Optimum {
         let near = self.task.near();
         let near = near.as_ref().unwrap_or(self);
         let has_ceilings = self.task.bounds.has_ceilings();
-        let (t_f, found) = (self.task.t_f, self.numbers());
-        for ((column, expected), (_, other)) in found.into_iter().zip(near.numbers()) {
+        let t_f = self.task.t_f;
+        for ((column, expected), (_, other)) in self.numbers().into_iter().zip(near.numbers()) {
             let is_time = column.starts_with("time");
             let size = if is_time && !has_ceilings && expected == 0.0 { t_f } else { expected.abs() };
             let own = if column == "hamiltonian" { self.c_noise } else { 0.0 };
@@ -211,7 +211,6 @@ impl Optimum {
             let noise = own + if has_ceilings { rounding } else { 0.0 };
             row.compare_relative(column, expected, size + noise / rtol);
         }
-        self.compare_words(row, [3, 4, 5].map(|place| found[place].1));
         row.compare("friction_max", self.motion.greatest(|at| at.friction));
         row.compare_friction(self.motion.least(|at| at.friction));
         if let (Some(work), Some(error)) = (row.number("work"), row.number("work_error")) {
@@ -230,28 +229,6 @@ impl Optimum {
             let size = if slope == 0.0 { 1.0 } else { slope.abs() };
             row.compare_relative(column, slope, size + (noise + (other - slope).abs()) / rtol);
         }
-    }
-
-    /// Compares the words for the times on the floor and on both ceilings, unless rounding decides them.
-    fn compare_words(&self, row: &mut CheckedRow<'_>, times: [f64; 3]) {
-        let is_clear = |&time: &f64| time == 0.0 || time > 10.0 * LONG_ROUNDING_RTOL * self.task.t_f;
-        if self.task.bounds.has_ceilings() && !times.iter().all(is_clear) {
-            return;
-        }
-        let [at_floor, at_v_ceiling, at_tau_ceiling] = times.map(|time| time > 0.0);
-        let binding = match (at_v_ceiling, at_tau_ceiling) {
-            (true, true) => "both",
-            (true, false) => "v_ceiling",
-            (false, true) => "tau_ceiling",
-            (false, false) => "none",
-        };
-        row.compare_word("binding", binding);
-        let strategy = match self.start.v {
-            _ if at_floor => "floor",
-            v if v / self.task.problem.v_i - 1.0 > 2.0 * f64::EPSILON => "speed_up",
-            _ => "slow_down",
-        };
-        row.compare_word("strategy", strategy);
     }
 
     /// The kind of the arc at the start.

@@ -217,13 +217,9 @@ pub fn shortcut(row: &mut CheckedRow<'_>) -> Checked {
     if !["ok", "below_bound", NEGATIVE, "infeasible"].iter().any(|status| row.has_status(status)) {
         return Err("status is neither ok, below_bound, negative_friction nor infeasible");
     }
-    let bound = obstacle(&case, name, bounds.floor)
+    let exists = exists(&case, name, bounds.floor)
         .ok_or("too close to the border to determine whether the family has a member")?;
-    let has_numbers = row.compare_feasible(bound.is_none());
-    if let Some(bound) = bound {
-        row.compare_word("bound", bound);
-    }
-    if !has_numbers {
+    if !row.compare_feasible(exists) {
         return Ok(());
     }
     let Some(followed) = follow(row, "shortcut", None, |row, followed| formula(row, &case, name, followed))? else {
@@ -294,7 +290,6 @@ impl Exponential<'_> {
         let determined =
             followed.samples.iter().map(coefficient).filter(|fit| fit.iter().all(|number| number.is_finite()));
         let Some([c, noise]) = determined.min_by(|x, y| x[1].total_cmp(&y[1])) else { return [f64::INFINITY; 2] };
-        row.demand("alpha", true);
         row.compare_relative("alpha", c / unit, (c.abs() + noise / row.context.rtol) / unit.abs());
         let off = followed.worst(|at| {
             let ([p, q], [distance, size]) = terms(at);
@@ -314,39 +309,39 @@ fn smooth_cubic(&Case { transition, t_f, .. }: &Case) -> Cubic {
     Cubic::new(&transition, t_f, [0.0, -3.0 * (v_f - v_i) / (v_i * v_f)])
 }
 
-/// The bound that leaves the family without a member, from the extreme protocols of the family; `None` where rounding decides.
-fn obstacle(case: &Case, family: &str, bounded: bool) -> Option<Option<&'static str>> {
+/// Whether the family has a member, from its extreme protocols; `None` where rounding decides.
+fn exists(case: &Case, family: &str, bounded: bool) -> Option<bool> {
     let Case { transition: problem, t_f, tau_ceiling } = *case;
     let Transition { law, v_i, v_f } = problem;
     // The room that each bound leaves, relative to the size of its terms.
     let mut rooms = Vec::new();
     if v_f < v_i && (bounded || family == "bounded_velocity") {
-        rooms.push(("time", t_f - min_duration(&problem, true), t_f));
+        rooms.push((t_f - min_duration(&problem, true), t_f));
     }
     match family {
-        "cubic" => rooms.push(("velocity", smooth_cubic(case).slack(StateLaw::Ageing), 1.0)),
+        "cubic" => rooms.push((smooth_cubic(case).slack(StateLaw::Ageing), 1.0)),
         "bounded_friction" => {
             let highest = [v_i, v_f].map(|v| 1.0 + (law.a - law.b) * v.ln()).into_iter().fold(f64::MIN, f64::max);
-            rooms.push(("friction", tau_ceiling - highest, highest.abs() + 1.0));
+            rooms.push((tau_ceiling - highest, highest.abs() + 1.0));
             if v_f > v_i && tau_ceiling > highest {
                 let bounds = Bounds::new(false).with_tau_ceiling(tau_ceiling);
                 let least = Task::new(&problem, t_f, bounds).time_on_ceilings()?;
-                rooms.push(("friction", t_f - least, t_f));
+                rooms.push((t_f - least, t_f));
             } else if v_f < v_i {
                 // With v = 0 throughout, theta rises by the time.
-                rooms.push(("velocity", t_f - (1.0 / v_f - 1.0 / v_i), t_f));
+                rooms.push((t_f - (1.0 / v_f - 1.0 / v_i), t_f));
             }
         }
         _ => {}
     }
-    for (bound, room, size) in rooms {
+    for (room, size) in rooms {
         match room / size {
-            room if room < -UNCLEAR_RTOL => return Some(Some(bound)),
+            room if room < -UNCLEAR_RTOL => return Some(false),
             room if room > UNCLEAR_RTOL => {}
             _ => return None,
         }
     }
-    Some(None)
+    Some(true)
 }
 
 /// Checks a row of `compliant`: its control moves the spring, also open loop.
@@ -371,8 +366,6 @@ pub fn compliant(row: &mut CheckedRow<'_>) -> Checked {
         off + followed.arrival(v_f)
     };
     let Some(followed) = follow(row, "compliant", None, formula)? else { return Ok(()) };
-    let ratio = if slider.m > 0.0 { slider.k * t_f * t_f / slider.m } else { f64::INFINITY };
-    row.compare("stiffness_ratio", ratio);
     let protocol = ControlledProtocol { slider, v_i, v_f, t_f, alpha: row.number("alpha").unwrap_or(found) };
     open_loop::compare(row, &protocol, &followed);
     if let Some(optimum) = row.certify(&Task::new(&problem, t_f, row.context.bounded)) {
@@ -397,7 +390,6 @@ pub fn regularised(row: &mut CheckedRow<'_>) -> Checked {
     if row.has_status("unproven") {
         return Err("status is unproven");
     }
-    ["work", "gap", "v_min", "v_max", "v_c_min", "v_c_max"].iter().for_each(|column| row.demand(column, true));
     let Some(optimum) = row.certify(&Task::new(&problem, t_f, bounded)) else { return Ok(()) };
     let corner = if bounded { optimum.motion.time_on(|at| at.v == 1.0) } else { 0.0 };
     // How far the protocol is from the optimum, on the floor up to the corner, where no piece replaces it.

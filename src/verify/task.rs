@@ -16,9 +16,6 @@ pub struct Task {
     pub form: Friction,
 }
 
-/// Least and greatest feasible time, or the ceiling that allows none, if it is one alone.
-type Limits = Result<(f64, f64), Option<&'static str>>;
-
 /// Distance of a friction ceiling from steady sliding, in `mu_0 sigma`, below which rounding decides. Chosen: a hundred roundings.
 const STEADY_NOISE: f64 = 2e-14;
 
@@ -107,8 +104,8 @@ impl Task {
         time(time(steepest)?)
     }
 
-    /// The least and the greatest feasible time; `None` where rounding decides.
-    fn limits(&self) -> Option<Limits> {
+    /// The least and the greatest feasible time, if the ceilings allow any; `None` where rounding decides.
+    fn limits(&self) -> Option<Option<(f64, f64)>> {
         let (from, to) = (self.from(), self.to());
         let Bounds { floor, v_ceiling, tau_ceiling } = self.bounds;
         let rooms = self.steady().map(|v| friction_margin(self.problem.law, tau_ceiling, v).abs());
@@ -117,19 +114,18 @@ impl Task {
         }
         let [at_start, at_end] = [0.0, 1.0].map(self.cap());
         if to <= from {
-            let (cap, part) = if at_end <= at_start { (at_end, 1.0) } else { (at_start, 0.0) };
+            let cap = at_end.min(at_start);
             if cap < 0.0 || (cap == 0.0 && to < from) {
-                let [v, tau] = self.caps()(part);
-                return Some(Err((v != tau).then_some(if v < tau { "v_ceiling" } else { "tau_ceiling" })));
+                return Some(None);
             }
-            return Some(Ok((if to < from { self.time_on_ceilings()? } else { 0.0 }, f64::INFINITY)));
+            return Some(Some((if to < from { self.time_on_ceilings()? } else { 0.0 }, f64::INFINITY)));
         }
         let least = if floor {
             let room = tau_ceiling - (1.0 + self.problem.law.b * to.ln());
             match () {
-                () if v_ceiling < 1.0 => return Some(Err(Some("v_ceiling"))),
+                () if v_ceiling < 1.0 => return Some(None),
                 () if room.abs() < STEADY_NOISE => return None,
-                () if room < 0.0 => return Some(Err(Some("tau_ceiling"))),
+                () if room < 0.0 => return Some(None),
                 () => ((to - from) / (1.0 - to)).ln_1p(),
             }
         } else {
@@ -138,7 +134,7 @@ impl Task {
         // Above theta_1 theta can wait or turn; below it only where the ceilings allow steady sliding.
         let allows = |part: f64| self.cap()(part) > 0.0;
         let waits = at_end >= 0.0 || allows(0.0) || self.crossing().is_some_and(allows);
-        Some(Ok((least, if waits { f64::INFINITY } else { self.time_on_ceilings()? })))
+        Some(Some((least, if waits { f64::INFINITY } else { self.time_on_ceilings()? })))
     }
 
     /// Whether there is a protocol; `None` where rounding decides.
@@ -149,24 +145,17 @@ impl Task {
         }
         let clear = |room: f64| (room.abs() > UNCLEAR_RTOL * self.t_f).then_some(room > 0.0);
         match self.limits()? {
-            Err(_) => Some(false),
-            Ok((least, most)) => Some(clear(self.t_f - least)? && clear(most - self.t_f)?),
+            None => Some(false),
+            Some((least, most)) => Some(clear(self.t_f - least)? && clear(most - self.t_f)?),
         }
     }
 
-    /// Compares the least feasible numbers and the reason of an infeasible row.
+    /// Compares the least feasible numbers.
     pub fn compare_limits(&self, row: &mut CheckedRow<'_>) {
         if let Some(limits) = self.limits() {
-            let least = limits.ok().map(|(least, _)| least);
+            let least = limits.map(|(least, _)| least);
             let scale = least.filter(|least| *least != 0.0).unwrap_or(self.t_f);
             row.compare_relative("t_least", least, scale.abs());
-            match limits {
-                _ if !row.has_status("infeasible") => row.demand("bound", false),
-                Err(ceiling) => ceiling.into_iter().for_each(|ceiling| row.compare_word("bound", ceiling)),
-                Ok((least, _)) => {
-                    row.compare_word("bound", if self.t_f <= least { "too_fast" } else { "too_slow" });
-                }
-            }
         }
         if self.form == Friction::Regularised {
             return;
@@ -179,7 +168,6 @@ impl Task {
             [("v_ceiling_least", 0.0, &by_v), ("tau_ceiling_least", 1.0, &by_tau)];
         let margin = 10.0 * row.context.rtol;
         for (column, terms, under) in ceilings {
-            under(f64::INFINITY).into_iter().for_each(|exists| row.demand(column, exists));
             let Some(least) = row.number(column) else { continue };
             // Ten `rtol` above a least ceiling a protocol exists, ten below none does.
             let [below, above] = [-margin, margin].map(|part| under(least + part * (terms + least.abs())));
