@@ -30,6 +30,8 @@ pub use optimum_cache::{OPTIMUM_AXES, OptimumCache, uncapped_optimum};
 #[cfg(feature = "plot")]
 pub(crate) use reduced::EDGES as HISTOGRAM_EDGES;
 pub use reduced::MAX_SORTED;
+#[cfg(feature = "read")]
+pub(crate) use {compliant::slider, optimum_cache::transition};
 
 /// A table: the axes of its rows, its columns and its computation.
 pub struct Table {

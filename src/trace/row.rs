@@ -2,8 +2,8 @@
 
 use super::Protocol;
 use crate::dataset::{Cell, Row};
-use crate::grid::Quantity;
-use crate::model::{Friction, StateLaw};
+use crate::grid::{Point, Quantity};
+use crate::model::Friction;
 use crate::protocol::Status;
 use crate::protocol::shortcut::Case;
 use crate::table::STATUS;
@@ -29,6 +29,22 @@ pub enum Pathless {
     Duration,
 }
 
+/// The axes of a row. An axis that it lacks, as in a table of an earlier version, has its default, or is NaN.
+pub fn point_of(row: &Row) -> Point {
+    let mut point = Point::default();
+    for quantity in Quantity::ALL {
+        let cell = row.iter().find(|(name, _)| name == quantity.name()).map(|(_, cell)| cell);
+        let place = |word: &str| quantity.words().iter().position(|known| *known == word).map(|place| place as f64);
+        let written = match cell {
+            Some(Cell::Number(number)) => Some(*number),
+            Some(Cell::Word(word)) => place(word),
+            _ => None,
+        };
+        point[quantity] = written.or(quantity.default().first().copied()).unwrap_or(f64::NAN);
+    }
+    point
+}
+
 /// The name, the protocol and the case of a row of `table` in scaled units. `relative` states which of `alpha_2` and `alpha_3` are relative to
 /// the duration; `t_f` is the time span of a step response.
 ///
@@ -43,9 +59,8 @@ pub fn protocol_of(
     if !TABLES.contains(&table) {
         return Err(Pathless::Table(table.to_owned()));
     }
-    let cell = |name: &str| row.iter().find(|(known, _)| known == name).map(|(_, cell)| cell);
-    let word = |name: &str| match cell(name) {
-        Some(Cell::Word(word)) => Some(word.as_str()),
+    let word = |name: &str| match row.iter().find(|(known, _)| known == name) {
+        Some((_, Cell::Word(word))) => Some(word.as_str()),
         _ => None,
     };
     if word(STATUS) == Some(Status::NotConverged.name()) {
@@ -54,16 +69,10 @@ pub fn protocol_of(
     if table == "step_response" && t_f.is_none() {
         return Err(Pathless::Duration);
     }
-    let written = |quantity: Quantity| cell(quantity.name()).and_then(Cell::number);
+    let point = point_of(row);
     let number = |quantity: Quantity| {
-        let time = written(Quantity::Time);
-        let value = match quantity {
-            Quantity::Time => time.or(t_f),
-            Quantity::Law => word("law").and_then(StateLaw::find).map(|law| f64::from(law as u8)),
-            _ => written(quantity),
-        };
-        // Tables of earlier versions lack some axes.
-        value.or(quantity.default().first().copied())
+        let written = Some(point[quantity]).filter(|number| !number.is_nan());
+        written.or(t_f.filter(|_| quantity == Quantity::Time))
     };
     let name = match table {
         "gap_min" => "gap",

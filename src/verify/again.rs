@@ -49,12 +49,9 @@ fn alone(written: &CheckedRow<'_>, table: &'static Table, spec: &Spec) -> Option
         _ => return None,
     };
     let value = |&axis: &Quantity| {
-        let name = axis.name();
-        let word =
-            || axis.words().iter().position(|known| Some(*known) == written.word(name)).map(|place| place as f64);
         // With the axis of ceilings the table is that of all laws, also without a ceiling.
-        let law = || (axis == Quantity::Law && written.has_column("v_ceiling")).then_some(0.0);
-        Some((axis, vec![written.number(name).or_else(word).or_else(law)?]))
+        let is_law = axis == Quantity::Law && written.cell("v_ceiling").is_some();
+        (is_law || written.cell(axis.name()).is_some()).then(|| (axis, vec![written.point[axis]]))
     };
     let direct = Direct {
         table,

@@ -1,12 +1,12 @@
 //! A row under check: its cells, the differences found, and the skipped checks.
 
 use crate::dataset::{Cell, Row};
-use crate::model::{Friction, Law, StateLaw, Transition};
-use crate::protocol::SpringBlock;
+use crate::grid::{Point, Quantity};
+use crate::model::Friction;
 use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::Case;
 use crate::table::{STATUS, Table};
-use crate::trace::{Pathless, Protocol, protocol_of};
+use crate::trace::{Pathless, Protocol, point_of, protocol_of};
 
 /// The context of a check: properties of the sweep.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +23,8 @@ pub struct Context {
 #[derive(Debug)]
 pub struct CheckedRow<'a> {
     cells: &'a Row,
+    /// Its axes.
+    pub point: Point,
     pub context: Context,
     pub differences: Vec<Difference>,
     /// The reasons for skipped checks.
@@ -45,14 +47,15 @@ pub struct Difference {
 impl<'a> CheckedRow<'a> {
     /// The row of these cells after its `check`.
     pub fn new(cells: &'a Row, context: Context, check: impl FnOnce(&mut CheckedRow<'a>) -> Checked) -> CheckedRow<'a> {
-        let mut row = CheckedRow { cells, context, differences: Vec::new(), unchecked: Vec::new() };
+        let point = point_of(cells);
+        let mut row = CheckedRow { cells, point, context, differences: Vec::new(), unchecked: Vec::new() };
         if let Err(reason) = check(&mut row) {
             row.miss(reason);
         }
         row
     }
 
-    fn cell(&self, column: &str) -> Option<&'a Cell> {
+    pub fn cell(&self, column: &str) -> Option<&'a Cell> {
         self.cells.iter().find(|(name, _)| name == column).map(|(_, cell)| cell)
     }
 
@@ -76,30 +79,6 @@ impl<'a> CheckedRow<'a> {
         self.cells.iter().any(|(name, _)| name.starts_with(start))
     }
 
-    /// The number of an axis.
-    pub fn axis(&self, name: &str) -> Result<f64, &'static str> {
-        self.number(name).ok_or("an axis is missing")
-    }
-
-    /// The evolution law of the state: ageing without such a column.
-    pub fn state_law(&self) -> Result<StateLaw, &'static str> {
-        self.word("law").map_or(Some(StateLaw::Ageing), StateLaw::find).ok_or("the law is unknown")
-    }
-
-    pub fn law(&self) -> Result<Law, &'static str> {
-        Ok(Law { a: self.axis("a")?, b: self.axis("b")? })
-    }
-
-    pub fn transition(&self) -> Result<Transition, &'static str> {
-        Ok(Transition { law: self.law()?, v_i: self.axis("v_i")?, v_f: self.axis("v_f")? })
-    }
-
-    /// The block and its spring, rigid without such a column.
-    pub fn slider(&self) -> Result<SpringBlock, &'static str> {
-        let [k, m] = [("k", f64::INFINITY), ("m", 0.0)].map(|(name, absent)| self.number(name).unwrap_or(absent));
-        Ok(SpringBlock { law: self.law()?, k, m })
-    }
-
     /// The protocol of a row of `table`.
     pub fn protocol(&self, table: &str) -> Result<(Protocol, Case), &'static str> {
         let Context { friction, bounded, relative, .. } = self.context;
@@ -112,8 +91,8 @@ impl<'a> CheckedRow<'a> {
 
     /// The bounds of its optimum.
     pub fn bounds(&self) -> Bounds {
-        let ceiling = |name| self.number(name).unwrap_or(f64::INFINITY);
-        let (v_ceiling, tau_ceiling) = (ceiling("v_ceiling"), ceiling("tau_ceiling"));
+        let [v_ceiling, tau_ceiling] =
+            [Quantity::VelocityCeiling, Quantity::FrictionCeiling].map(|axis| self.point[axis]);
         Bounds { floor: self.context.bounded, v_ceiling, tau_ceiling }
     }
 

@@ -6,6 +6,7 @@ use super::route::integrate;
 use super::task::{Task, min_duration};
 use super::{Checked, CheckedRow};
 use crate::model::Transition;
+use crate::table::transition;
 
 /// Relative step of a time for the slope of its condition. Chosen: the cube root of rounding, which balances both errors of a central difference.
 const TIME_STEP_RTOL: f64 = 1e-5;
@@ -39,7 +40,7 @@ fn compare(
 }
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
-    let problem = row.transition()?;
+    let problem = transition(&row.point);
     if !(row.has_status("ok") || row.has_status(NEGATIVE)) {
         return Err("status is neither ok nor negative_friction");
     }

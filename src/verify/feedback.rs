@@ -3,13 +3,15 @@
 use super::optimal::Optimum;
 use super::task::Task;
 use super::{Checked, CheckedRow};
+use crate::grid::Quantity;
 use crate::model::{Law, Transition};
 use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::protocol::optimal::ArcKind;
+use crate::table::transition;
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
-    let (theta, t_f, v_f) = (row.axis("theta")?, row.axis("t_left")?, row.axis("v_f")?);
-    let problem = Transition { law: row.law()?, v_i: 1.0 / theta, v_f };
+    let [theta, t_f] = [Quantity::Theta, Quantity::TimeLeft].map(|axis| row.point[axis]);
+    let problem = Transition { v_i: 1.0 / theta, ..transition(&row.point) };
     let task = Task { theta: Some(theta), ..Task::new(&problem, t_f, row.bounds()) };
     if !row.compare_feasible(task.is_feasible()) {
         return Ok(());

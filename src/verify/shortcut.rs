@@ -7,6 +7,7 @@ use super::open_loop::{self, ControlledProtocol};
 use super::route::UNCLEAR_RTOL;
 use super::task::{Task, min_duration};
 use super::{Checked, CheckedRow, relaxed};
+use crate::grid::Quantity;
 use crate::model::{StateLaw, Transition};
 use crate::numerics::LONG_ROUNDING_RTOL;
 use crate::numerics::double_double::DoubleDouble;
@@ -14,7 +15,7 @@ use crate::protocol::cubic::Landscape;
 use crate::protocol::optimal::Bounds;
 use crate::protocol::shortcut::Case;
 use crate::protocol::{Moment, SolverStats, Status};
-use crate::table::STATUS;
+use crate::table::{STATUS, slider, transition};
 use crate::trace::Absence;
 
 /// Times that an interval of a cubic may be halved. Chosen: the velocity of the slip law has kinks, to which halving leads.
@@ -23,24 +24,25 @@ const CUBIC_SPLITS: u32 = 40;
 /// Relative rounding error of a square root of a number that rounding alone keeps from 0. Derived: the root of 1e-15, with room.
 const HALF_OF_THE_DIGITS: f64 = 1e-7;
 
-/// The traced protocol of a row of `table`, whose numbers are compared; `formula` adds its errors beyond those of the equations. `None`, and an
-/// error, if there is no protocol.
+/// The traced protocol of a row of `table`, whose numbers are compared; `formula` adds its errors beyond those of the equations. Without a protocol the
+/// row is wrong.
 fn follow(
     row: &mut CheckedRow<'_>,
     table: &str,
     cubic: Option<&Cubic>,
     formula: impl FnOnce(&mut CheckedRow<'_>, &Followed) -> f64,
-) -> Result<Option<Followed>, &'static str> {
-    let ((protocol, case), state) = (row.protocol(table)?, row.state_law()?);
+) -> Result<Followed, &'static str> {
+    let ((protocol, case), state) = (row.protocol(table)?, row.point.state_law());
     let path = match protocol.path(&case, row.context.rtol) {
         Ok(path) => path,
         Err(Absence::Border) => return Err("cubics at the border, which have no motion"),
         Err(_) => {
             row.push("motion", f64::INFINITY);
-            return Ok(None);
+            return Err("there is no motion of the row");
         }
     };
-    let followed = Followed::new(path.motion, state, &row.slider()?, if cubic.is_some() { CUBIC_SPLITS } else { 0 });
+    let followed =
+        Followed::new(path.motion, state, &slider(&row.point), if cubic.is_some() { CUBIC_SPLITS } else { 0 });
     let off = formula(row, &followed) + (followed.end().t / case.t_f - 1.0).abs();
     row.push("motion", followed.equation + off);
     row.push("control", followed.control);
@@ -63,7 +65,7 @@ fn follow(
     let [least, greatest] = followed.control_range();
     row.compare_relative("v_c_min", least, least.abs().max(greatest.abs()));
     row.compare_relative("v_c_max", greatest, least.abs().max(greatest.abs()));
-    Ok(Some(followed))
+    Ok(followed)
 }
 
 impl CheckedRow<'_> {
@@ -137,7 +139,7 @@ impl Cubic {
 
 /// Checks a row of `gap`.
 pub fn gap(row: &mut CheckedRow<'_>) -> Checked {
-    let (task, state) = (Task::of(row)?, row.state_law()?);
+    let (task, state) = (Task::of(row), row.point.state_law());
     let cubic = Cubic::new(&task.problem, task.t_f, row.coefficients(task.t_f).ok_or("an axis is missing")?);
     let slack = cubic.slack(state);
     if slack.abs() < 1e-9 {
@@ -151,7 +153,7 @@ pub fn gap(row: &mut CheckedRow<'_>) -> Checked {
     if !row.compare_feasible(if slack <= 0.0 { Some(false) } else { has_optimum }) {
         return Ok(());
     }
-    let Some(followed) = follow(row, "gap", Some(&cubic), |_, followed| cubic.off(followed))? else { return Ok(()) };
+    let followed = follow(row, "gap", Some(&cubic), |_, followed| cubic.off(followed))?;
     let least = match relaxed {
         Some(optimum) => optimum.value,
         None => row.certify(&task).map(|optimum| optimum.work),
@@ -171,15 +173,13 @@ const FAR_FRACTIONS: [f64; 5] = [0.2, 0.4, 0.8, 1.6, 3.2];
 
 /// Checks a row of `best_cubic`: no neighbour takes less work.
 pub fn best_cubic(row: &mut CheckedRow<'_>) -> Checked {
-    let (task, state, rtol) = (Task::of(row)?, row.state_law()?, row.context.rtol);
+    let (task, state, rtol) = (Task::of(row), row.point.state_law(), row.context.rtol);
     if !(row.has_status("ok") || row.has_status(NEGATIVE)) {
         return Err("status is neither ok nor negative_friction");
     }
     let [a_2, a_3] = row.coefficients(task.t_f).ok_or("a coefficient was not written")?;
     let cubic = Cubic::new(&task.problem, task.t_f, [a_2, a_3]);
-    let Some(followed) = follow(row, "best_cubic", Some(&cubic), |_, followed| cubic.off(followed))? else {
-        return Ok(());
-    };
+    let followed = follow(row, "best_cubic", Some(&cubic), |_, followed| cubic.off(followed))?;
     if state != StateLaw::Ageing {
         if let Some(least) = relaxed::certify(row, &task.problem, state, task.t_f).value {
             row.compare_gap(least, followed.work);
@@ -211,7 +211,7 @@ pub fn best_cubic(row: &mut CheckedRow<'_>) -> Checked {
 
 /// Checks a row of `shortcut`.
 pub fn shortcut(row: &mut CheckedRow<'_>) -> Checked {
-    let (problem, t_f, bounds) = (row.transition()?, row.axis("t_f")?, row.bounds());
+    let (problem, t_f, bounds) = (transition(&row.point), row.point[Quantity::Time], row.bounds());
     let name = row.word("family").ok_or("an axis is missing")?;
     let case = Case { transition: problem, t_f, tau_ceiling: bounds.tau_ceiling };
     if !["ok", "below_bound", NEGATIVE, "infeasible"].iter().any(|status| row.has_status(status)) {
@@ -222,9 +222,7 @@ pub fn shortcut(row: &mut CheckedRow<'_>) -> Checked {
     if !row.compare_feasible(exists) {
         return Ok(());
     }
-    let Some(followed) = follow(row, "shortcut", None, |row, followed| formula(row, &case, name, followed))? else {
-        return Ok(());
-    };
+    let followed = follow(row, "shortcut", None, |row, followed| formula(row, &case, name, followed))?;
     // The optimum of this family has its ceiling.
     let bounds = if name == "bounded_friction" { bounds } else { bounds.without_ceilings() };
     if let Some(optimum) = row.certify(&Task::new(&problem, t_f, bounds)) {
@@ -240,7 +238,6 @@ fn formula(row: &mut CheckedRow<'_>, case: &Case, name: &str, followed: &Followe
         row.compare_relative("terminal_error", followed.end().theta * v_f - 1.0, 1.0);
         return followed.worst(|at| (at.v / v_f - 1.0).abs());
     }
-    row.compare_relative("terminal_error", 0.0, 1.0);
     let shape = |x: f64| [x, x * (1.0 - x)];
     let over_floor = |at: &Moment| [at.v - 1.0, at.v];
     let under_ceiling = |at: &Moment| [tau_ceiling - at.friction, tau_ceiling.abs() + at.friction.abs()];
@@ -251,10 +248,7 @@ fn formula(row: &mut CheckedRow<'_>, case: &Case, name: &str, followed: &Followe
             (Exponential { t_f, first: v_i - 1.0, l, shape, distance: &over_floor, rounding: 0.0 }, -t_f * t_f)
         }
         // A parabola, for which alpha is 0.
-        _ if tau_ceiling == f64::INFINITY => {
-            row.compare_relative("alpha", 0.0, 1.0);
-            return followed.arrival(v_f);
-        }
+        _ if tau_ceiling == f64::INFINITY => return followed.arrival(v_f),
         _ => {
             let [first, last] = [v_i, v_f].map(|v| tau_ceiling - (1.0 + (law.a - law.b) * v.ln()));
             let rounding = (tau_ceiling.abs() + 1.0) / first.min(last);
@@ -346,7 +340,7 @@ fn exists(case: &Case, family: &str, bounded: bool) -> Option<bool> {
 
 /// Checks a row of `compliant`: its control moves the spring, also open loop.
 pub fn compliant(row: &mut CheckedRow<'_>) -> Checked {
-    let (problem, t_f, slider) = (row.transition()?, row.axis("t_f")?, row.slider()?);
+    let (problem, t_f, slider) = (transition(&row.point), row.point[Quantity::Time], slider(&row.point));
     if !row.compare_feasible(t_f > min_duration(&problem, true)) {
         return Ok(());
     }
@@ -365,7 +359,7 @@ pub fn compliant(row: &mut CheckedRow<'_>) -> Checked {
         found = alpha;
         off + followed.arrival(v_f)
     };
-    let Some(followed) = follow(row, "compliant", None, formula)? else { return Ok(()) };
+    let followed = follow(row, "compliant", None, formula)?;
     let protocol = ControlledProtocol { slider, v_i, v_f, t_f, alpha: row.number("alpha").unwrap_or(found) };
     open_loop::compare(row, &protocol, &followed);
     if let Some(optimum) = row.certify(&Task::new(&problem, t_f, row.context.bounded)) {
@@ -376,7 +370,7 @@ pub fn compliant(row: &mut CheckedRow<'_>) -> Checked {
 
 /// Checks a row of `regularised`: off its pieces the protocol is the optimum.
 pub fn regularised(row: &mut CheckedRow<'_>) -> Checked {
-    let (problem, t_f, delta_t) = (row.transition()?, row.axis("t_f")?, row.axis("delta_t")?);
+    let (problem, t_f, delta_t) = (transition(&row.point), row.point[Quantity::Time], row.point[Quantity::Smoothing]);
     let (bounded, rtol) = (row.context.bounded, row.context.rtol);
     let overlaps = 2.0 * delta_t > t_f || bounded && t_f < min_duration(&problem, true);
     let infeasible = row.has_status("infeasible");
@@ -404,7 +398,7 @@ pub fn regularised(row: &mut CheckedRow<'_>) -> Checked {
         }
     };
     let formula = |_: &mut CheckedRow<'_>, followed: &Followed| followed.worst(drift) + followed.arrival(problem.v_f);
-    let Some(followed) = follow(row, "regularised", None, formula)? else { return Ok(()) };
+    let followed = follow(row, "regularised", None, formula)?;
     row.compare_small_gap(optimum.work, &followed, rtol);
     let (least, friction_min) = (followed.least(|at| at.v), followed.least(|at| at.friction));
     if (least - 1.0).abs() > 100.0 * rtol && friction_min > 0.0 {

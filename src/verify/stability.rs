@@ -4,6 +4,8 @@ use super::motion::{bisect, tau};
 use super::{Checked, CheckedRow, hopf};
 use crate::model::{Friction, Law, Transition};
 use crate::numerics::double_double::DoubleDouble;
+use crate::protocol::SpringBlock;
+use crate::table::{slider, transition};
 
 /// Bisections of a real root. Derived: 32 digits of a root by 50 decades below its bound.
 const BISECTIONS: u32 = 280;
@@ -51,7 +53,8 @@ fn smoothness(row: &mut CheckedRow<'_>, problem: &Transition) {
 }
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
-    let (problem, state, k, m) = (row.transition()?, row.state_law()?, row.axis("k")?, row.axis("m")?);
+    let (problem, state) = (transition(&row.point), row.point.state_law());
+    let SpringBlock { k, m, .. } = slider(&row.point);
     let double = DoubleDouble::new;
     let friction = row.context.friction;
     let law = |v: f64| match friction {

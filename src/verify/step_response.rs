@@ -8,7 +8,7 @@ use crate::numerics::MAX_PANELS;
 use crate::protocol::{Motion, SpringBlock};
 use crate::stability::SteadySliding;
 use crate::stability::step_response::{Outcome, SETTLED, VelocityStep};
-use crate::table::STATUS;
+use crate::table::{STATUS, slider, transition};
 
 /// Relative overshoot below which its time is not determined. Chosen: the error of the time is `rtol` divided by the overshoot.
 const MIN_OVERSHOOT: f64 = 1e-3;
@@ -86,7 +86,8 @@ impl Events {
 }
 
 pub fn check(row: &mut CheckedRow<'_>) -> Checked {
-    let (problem, state, k, m) = (row.transition()?, row.state_law()?, row.axis("k")?, row.axis("m")?);
+    let (problem, state) = (transition(&row.point), row.point.state_law());
+    let SpringBlock { k, m, .. } = slider(&row.point);
     let Transition { law, v_i, v_f } = problem;
     hopf::Point::new(state, law, m * v_f * v_f).compare_coefficient(row);
     // The block follows a rigid spring at once.
@@ -236,7 +237,6 @@ fn compare(row: &mut CheckedRow<'_>, step: &VelocityStep, followed: &Followed) {
         }
     }
     row.compare_word("outcome", if settled.is_some() { "settled" } else { "limit_cycle" });
-    row.compare_word("stick_slip", if settled.is_some() { "false" } else { "true" });
     if let Some((entry, speed)) = settled {
         // Nearer to an edge of the band, it is undetermined whether an extremum leaves it.
         if events.margin > MAX_DIFFERENCE_RTOLS * rtol {

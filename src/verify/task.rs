@@ -2,8 +2,10 @@
 
 use super::CheckedRow;
 use super::route::{UNCLEAR_RTOL, integrate};
+use crate::grid::Quantity;
 use crate::model::{Friction, Transition, friction_margin};
 use crate::protocol::optimal::Bounds;
+use crate::table::transition;
 
 /// A transition to steady sliding in a given time, under bounds.
 #[derive(Debug, Clone, Copy)]
@@ -26,9 +28,9 @@ impl Task {
     }
 
     /// That of a row.
-    pub fn of(row: &CheckedRow<'_>) -> Result<Task, &'static str> {
-        let task = Task::new(&row.transition()?, row.axis("t_f")?, row.bounds());
-        Ok(Task { form: row.context.friction, ..task })
+    pub fn of(row: &CheckedRow<'_>) -> Task {
+        let task = Task::new(&transition(&row.point), row.point[Quantity::Time], row.bounds());
+        Task { form: row.context.friction, ..task }
     }
 
     /// State variable at the start.
