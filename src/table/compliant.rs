@@ -77,14 +77,10 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
         let key = (tuple, slider.k.to_bits(), slider.m.to_bits());
         let Solution { solved, amplification, work_error } = members.get(key, || solve(job, point, &mut work));
         let Some(member) = solved.value else { return (solved.status, None, work) };
-        let mut status = solved.status;
-        let mut least = Comparison::NONE;
-        if needs_optimum(job.projection) {
-            let bounded = job.projection.has(Index::gap_error);
-            let (free, works) = (Bounds::new(job.bounded), (member.work, work_error));
-            least = optimum_cache::compare(job, (tuple, point), &free, works, bounded, &mut work);
-            status = status.compared_with(least.optimum);
-        }
+        let wanted = [needs_optimum(job.projection), job.projection.has(Index::gap_error)];
+        let (free, works) = (Bounds::new(job.bounded), (member.work, work_error));
+        let least = optimum_cache::compare(job, (tuple, point), &free, works, wanted, &mut work);
+        let status = solved.status.compared_with(least.optimum);
         let is_held = job.projection.has(Index::sampling_error) && dt > 0.0;
         let is_followed = job.projection.has(Index::open_loop_error);
         let held = is_held.then(|| held_error(&slider, velocities(point), t_f, dt, job.rtol));

@@ -103,20 +103,23 @@ impl Comparison {
     pub const NONE: Comparison = Comparison { work: f64::NAN, gap: f64::NAN, gap_error: f64::NAN, optimum: Status::Ok };
 }
 
-/// Compares a work and its error bound with the least work of the tuple of `point` under `bounds`. `wanted` requests the error bound of
-/// the gap. Adds the solver statistics to `work`.
+/// Compares a work and its error bound with the least work of the tuple of `point` under `bounds`, if that is `wanted`; the second request is that of the
+/// error bound of the gap. Adds the solver statistics to `work`.
 pub fn compare(
     job: &Job<'_>,
     row: (u64, &Point),
     bounds: &Bounds,
     (work_s, error): (f64, f64),
-    wanted: bool,
+    wanted: [bool; 2],
     work: &mut RunStats,
 ) -> Comparison {
+    if !wanted[0] {
+        return Comparison::NONE;
+    }
     let optimum = optimum(job, row, bounds, work);
     let status = if optimum.status == Status::Infeasible { Status::Ok } else { optimum.status };
     let Some(least) = optimum.value else { return Comparison { optimum: status, ..Comparison::NONE } };
-    let gap_error = if wanted {
+    let gap_error = if wanted[1] {
         error::of_gap((work_s, error), (least.work, work_error(row.1, bounds, &least, work)))
     } else {
         f64::NAN

@@ -92,22 +92,18 @@ fn compute(job: &Job<'_>, range: Range<u64>, buffer: &mut ColumnBuffer) -> Resul
                 return (obstacle.status(), Some(row), work);
             }
         };
-        let mut status = member.status();
-        if needs_optimum(job.projection) {
-            let bounded = job.projection.has(Index::gap_error);
-            let free = Bounds::new(job.bounded);
-            // The members of the family obey its own friction ceiling, or none.
-            let is_capped = family.uses_tau_ceiling;
-            let bounds = if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free };
-            let works = (member.work, row.work_error);
-            row.least = optimum_cache::compare(job, (tuple, point), &bounds, works, bounded, &mut work);
-            status = status.compared_with(row.least.optimum);
-        }
+        let free = Bounds::new(job.bounded);
+        // The members of the family obey its own friction ceiling, or none.
+        let is_capped = family.uses_tau_ceiling;
+        let bounds = if is_capped { free.with_tau_ceiling(point[Quantity::FrictionCeiling]) } else { free };
+        let wanted = [needs_optimum(job.projection), job.projection.has(Index::gap_error)];
+        let works = (member.work, row.work_error);
+        row.least = optimum_cache::compare(job, (tuple, point), &bounds, works, wanted, &mut work);
         if family.name == "bounded_velocity" {
             row.alpha_unit = job.grid.units.size("v_0/l").powi(2);
         }
         row.member = Some(member);
-        (status, Some(row), work)
+        (member.status().compared_with(row.least.optimum), Some(row), work)
     })
 }
 
