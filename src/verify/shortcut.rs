@@ -303,39 +303,29 @@ fn smooth_cubic(&Case { transition, t_f, .. }: &Case) -> Cubic {
     Cubic::new(&transition, t_f, [0.0, -3.0 * (v_f - v_i) / (v_i * v_f)])
 }
 
-/// Whether the family has a member, from its extreme protocols; `None` where rounding decides.
+/// Whether the family has a member: some protocol under its bounds arrives, and its own shape allows one; `None` where rounding decides.
 fn exists(case: &Case, family: &str, bounded: bool) -> Option<bool> {
     let Case { transition: problem, t_f, tau_ceiling } = *case;
     let Transition { law, v_i, v_f } = problem;
-    // The room that each bound leaves, relative to the size of its terms.
-    let mut rooms = Vec::new();
-    if v_f < v_i && (bounded || family == "bounded_velocity") {
-        rooms.push((t_f - min_duration(&problem, true), t_f));
-    }
-    match family {
-        "cubic" => rooms.push((smooth_cubic(case).slack(StateLaw::Ageing), 1.0)),
+    let free = Bounds::new(bounded || family == "bounded_velocity");
+    // The room that the shape leaves, relative to the size of its terms.
+    let (bounds, room) = match family {
+        "cubic" => (free, smooth_cubic(case).slack(StateLaw::Ageing)),
         "bounded_friction" => {
             let highest = [v_i, v_f].map(|v| 1.0 + (law.a - law.b) * v.ln()).into_iter().fold(f64::MIN, f64::max);
-            rooms.push((tau_ceiling - highest, highest.abs() + 1.0));
-            if v_f > v_i && tau_ceiling > highest {
-                let bounds = Bounds::new(false).with_tau_ceiling(tau_ceiling);
-                let least = Task::new(&problem, t_f, bounds).time_on_ceilings()?;
-                rooms.push((t_f - least, t_f));
-            } else if v_f < v_i {
-                // With v = 0 throughout, theta rises by the time.
-                rooms.push((t_f - (1.0 / v_f - 1.0 / v_i), t_f));
-            }
+            (free.with_tau_ceiling(tau_ceiling), (tau_ceiling - highest) / (highest.abs() + 1.0))
         }
-        _ => {}
+        _ => (free, f64::INFINITY),
+    };
+    if room <= UNCLEAR_RTOL {
+        return (room < -UNCLEAR_RTOL).then_some(false);
     }
-    for (room, size) in rooms {
-        match room / size {
-            room if room < -UNCLEAR_RTOL => return Some(false),
-            room if room > UNCLEAR_RTOL => {}
-            _ => return None,
-        }
+    // Without a floor every duration has a step, and the shape of a cubic decides.
+    if !bounds.floor && family != "bounded_friction" {
+        return Some(true);
     }
-    Some(true)
+    let is_clear = (t_f - min_duration(&problem, bounds.floor)).abs() > UNCLEAR_RTOL * t_f;
+    is_clear.then(|| Task::new(&problem, t_f, bounds).is_feasible()).flatten()
 }
 
 /// Checks a row of `compliant`: its control moves the spring, also open loop.
