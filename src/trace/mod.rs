@@ -18,7 +18,9 @@ pub use protocol::{
     Absence, Disturbed, Parameter, Protocol, TracedPath, has_floor, has_regularised_friction, names, quantities,
 };
 #[cfg(feature = "read")]
-pub use row::{Pathless, TABLES, point_of, protocol_of};
+pub(crate) use row::point_of;
+#[cfg(feature = "read")]
+pub use row::{Pathless, TABLES, protocol_of};
 pub use sample::{RANGE_RTOL, VALUE_RTOL};
 pub use write::{csv, parquet, record_batch};
 

@@ -90,6 +90,31 @@ fn landscapes_of_other_laws_are_verified() {
     }
 }
 
+#[test]
+fn optima_of_other_laws_are_computed_again() {
+    let numbers = ["work_bang_bang", "work_error", "v_ceiling_least", "dwork_dv_ceiling", "t_least", "chatter_duty"];
+    let words = [("binding", "none"), ("bound", "too_slow")];
+    let columns =
+        [&numbers[..], &["work", "v_start", "theta_max", "dwork_db", "dwork_dv_i", "binding", "bound"]].concat();
+    let table = format!("[tables.optimal]\ncolumns = {columns:?}\n");
+    let folder = tempfile::tempdir().expect("is writable");
+    let axes = "law = [\"slip\", \"prz\"]\nt_f = [0.1, 0.4, 1.2]\na = 0.03\nb = 0.05\nv_i = [4.0, 60.0]\nv_f = [80.0, 2.5]\nv_ceiling = 600.0\n";
+    run(&sweep(folder.path(), axes, &table), folder.path(), 2);
+    let output = verify(folder.path(), &["--sample", "1000"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", text(&output), String::from_utf8_lossy(&output.stderr));
+    for column in numbers {
+        corrupt(folder.path(), "optimal", column);
+    }
+    for (column, word) in words {
+        reword(folder.path(), "optimal", column, word);
+    }
+    let output = verify(folder.path(), &["--sample", "1000"]);
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output));
+    for column in numbers.into_iter().chain(words.map(|(column, _)| column)) {
+        assert!(blames(&output, column), "{column}: {}", text(&output));
+    }
+}
+
 /// The first one touches the floor; in the last one theta rises as fast as its law allows, over a small part of the time.
 #[test]
 fn regress_a_kink_of_the_velocity_raises_no_alarm() {
