@@ -55,7 +55,7 @@ fn main() {
 /// Points over the range of every parameter, logarithmically uniform; one in ten without mass, one in ten on a rigid spring.
 fn statuses() {
     let mut state = 7;
-    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::uniform(&mut state));
+    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::tests::uniform(&mut state));
     let (mut smooth, mut pieces, mut most) = ([0; 5], [0; 5], 0);
     let seconds = support::median(1, || {
         for _ in 0..SAMPLE {

@@ -80,7 +80,7 @@ fn main() {
 /// Outcomes, times and errors at random points of the physical domain, logarithmically uniform; one in eleven without mass.
 fn domain(points: usize) {
     let mut state = 7;
-    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::uniform(&mut state));
+    let mut random = |least: f64, greatest: f64| least * (greatest / least).powf(support::tests::uniform(&mut state));
     let steps: Vec<VelocityStep> = (0..points)
         .map(|i| {
             let a = random(1e-3, 0.3);

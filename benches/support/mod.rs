@@ -10,9 +10,7 @@ use slipsweep::numerics::elementary::{exp, ln};
 use slipsweep::numerics::turning::turning_lanes;
 
 #[path = "../../tests/support/mod.rs"]
-mod tests;
-
-pub use tests::uniform;
+pub mod tests;
 
 /// Numbers between 0 and 1 by xorshift.
 pub fn xorshift() -> impl FnMut() -> f64 {

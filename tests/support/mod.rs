@@ -1,5 +1,8 @@
 //! What the tests have in common: how far a number is from the expected one, and random numbers.
 
+// Each crate of tests or benchmarks uses some of it.
+#![allow(dead_code)]
+
 /// The relative error of a number; 0 where both are the same, 0 and infinity included.
 pub fn relative(found: f64, expected: f64) -> f64 {
     if found == expected { 0.0 } else { ((found - expected) / expected).abs() }
