@@ -504,6 +504,35 @@ fn a_disturbance_compares_both_loops() {
     assert!(none.contains("v(theta, t_left): work +0, terminal_error 0\n"), "{none}");
 }
 
+/// A disturbed row of a dataset is the disturbed protocol of its numbers, in the units of the dataset.
+#[test]
+fn a_disturbed_row_has_the_units_of_its_dataset() {
+    let folder = tempfile::tempdir().expect("is writable");
+    dataset(folder.path());
+    let facts = |arguments: &[&str]| {
+        let disturb = ["--disturb", "theta=+10% at 0.25", "--loop", "open", "--format", "csv"];
+        let output = trace(folder.path(), &[arguments, &disturb]);
+        let text = String::from_utf8(output.stdout).expect("is text");
+        let number = |key: &str| -> f64 {
+            let line = text.lines().find_map(|line| line.strip_prefix(&format!("# {key} = ")));
+            line.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no {key}: {text}"))
+        };
+        ["disturbed_at", "extra_work", "terminal_error"].map(number)
+    };
+    let row = facts(&["results/rows", "optimal", "--row", "0"]);
+    let scaled = facts(&["optimal", "--t-f", "0.02", "--a", "0.03", "--b", "0.05", "--v-i", "3", "--v-f", "5"]);
+    // l/v_0 = 1000 s, mu_0 sigma l = 0.6 J/m^2.
+    for ((row, scaled), unit) in row.into_iter().zip(scaled).zip([1e3, 0.6, 1.0]) {
+        assert!((row / (scaled * unit) - 1.0).abs() < 1e-9, "{row} {scaled}");
+    }
+    let text = trace(folder.path(), &[&["results/rows", "optimal", "--row", "0", "--disturb", "theta=+10% at 0.25"]]);
+    let text = String::from_utf8(text.stdout).expect("is text");
+    assert!(text.contains("at t = 5 s; extra work") && text.contains(" J/m^2, terminal_error "), "{text}");
+    let other =
+        trace(folder.path(), &[&["results/rows", "best_cubic", "--row", "0", "--disturb", "theta=+10% at 0.25"]]);
+    assert!(String::from_utf8_lossy(&other.stderr).starts_with("error: --disturb: "), "{other:?}");
+}
+
 /// The rest of an optimal protocol is the optimal protocol from its state.
 #[test]
 fn a_protocol_from_a_state_is_the_rest_of_the_whole() {

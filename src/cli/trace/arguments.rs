@@ -69,7 +69,7 @@ pub struct Arguments {
     #[arg(long, value_name = "STATE", value_parser = state, conflicts_with_all = ["v_i", "t_f", "table"])]
     pub(super) from: Option<State>,
     /// Sudden change of theta at a fraction of the duration, as "theta=+10% at 0.25"; compares open and closed loop; not with --points (optimal)
-    #[arg(long, value_name = "CHANGE", value_parser = disturbance, conflicts_with_all = ["from", "points", "table"])]
+    #[arg(long, value_name = "CHANGE", value_parser = disturbance, conflicts_with_all = ["from", "points"])]
     pub(super) disturb: Option<Disturbance>,
     /// Protocol that is shown after the disturbance [default: closed]
     #[arg(

@@ -5,9 +5,11 @@ use crate::model::{Friction, Units};
 use crate::protocol::Status;
 use crate::trace::{self, COLUMNS, Disturbance, Parameter, RANGE_RTOL, Trace, TracedPath, VALUE_RTOL};
 
-/// What a disturbance does to a protocol: the work beyond the planned one and the terminal error, by loop.
+/// What a disturbance does to a protocol: the work beyond the planned one and the terminal error, by loop; in scaled units.
 pub(super) struct Effects {
     pub disturbance: Disturbance,
+    /// The units of the description.
+    pub units: Units,
     pub t: f64,
     /// The name of the loop that is shown.
     pub shown: &'static str,
@@ -20,25 +22,34 @@ impl Effects {
         let change = words::number(100.0 * self.disturbance.change);
         let sign = if self.disturbance.change > 0.0 { "+" } else { "" };
         let line = |name: &str, (extra, error): (f64, f64)| {
-            let sign = if extra < 0.0 { "" } else { "+" };
-            format!("    {name}: work {sign}{}, terminal_error {}\n", words::number(extra), words::number(error))
+            let (extra, sign) = (self.extra(extra), if extra < 0.0 { "" } else { "+" });
+            let work = format!("{sign}{} {}", words::number(extra.value), extra.unit);
+            format!("    {name}: work {}, terminal_error {}\n", work.trim_end(), words::number(error))
         };
         format!(
-            "  disturbed: theta {sign}{change} % at t = {}; extra work, and relative miss of the target theta\n{}{}  shown: {} loop\n",
-            words::number(self.t),
+            "  disturbed: theta {sign}{change} % at {}; extra work, and relative miss of the target theta\n{}{}  shown: {} loop\n",
+            self.time().words(),
             line("open loop, v(t) as planned", self.open),
             line("closed loop, v(theta, t_left)", self.closed),
             self.shown,
         )
     }
 
+    fn time(&self) -> Named {
+        Named::scaled("t", self.t, "l/v_0", &self.units)
+    }
+
+    fn extra(&self, work: f64) -> Named {
+        Named::scaled("extra_work", work, "mu_0 sigma l", &self.units)
+    }
+
     pub fn facts(&self) -> Vec<(String, String)> {
         let (extra, error) = if self.shown == "open" { self.open } else { self.closed };
         [
             ("disturbed_theta", format!("{:?}", self.disturbance.change)),
-            ("disturbed_at", format!("{:?}", self.t)),
+            ("disturbed_at", format!("{:?}", self.time().value)),
             ("loop", self.shown.to_owned()),
-            ("extra_work", format!("{extra:?}")),
+            ("extra_work", format!("{:?}", self.extra(extra).value)),
             ("terminal_error", format!("{error:?}")),
         ]
         .map(|(key, value)| (key.to_owned(), value))

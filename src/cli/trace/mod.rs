@@ -208,7 +208,7 @@ impl Arguments {
             let trace = Trace::of(motion, &request.case.transition, times);
             trace.ok_or_else(|| Failure::failed("the protocol has more detail than a trace can resolve"))
         };
-        let Some((disturbance, Protocol::Optimal { bounds })) = self.disturb.zip(Some(request.protocol)) else {
+        let Some(disturbance) = self.disturb else {
             let path = request.protocol.path(&request.case, request.rtol).map_err(absent)?;
             if let Some(origin) = request.origin.as_ref().filter(|origin| origin.status == Some(Status::Infeasible)) {
                 let reason = "its status is infeasible: the response diverges, or its optimum does not exist";
@@ -217,11 +217,17 @@ impl Arguments {
             let trace = of(&*path.motion)?;
             return Ok((path, trace, None));
         };
+        let Protocol::Optimal { bounds } = request.protocol else {
+            let why =
+                "only the optimal protocol of the law `ageing` and logarithmic friction is known from every state";
+            return Err(wrong(format!("--disturb: {why}\n  help: remove --disturb")));
+        };
         let found = Disturbed::new(&request.case, &bounds, &disturbance, request.rtol).map_err(absent)?;
         let rest = if self.feedback == Loop::Open { &found.open } else { &found.closed };
         let trace = of(&*found.head)?.then(of(&*rest.motion)?);
         let effects = Effects {
             disturbance,
+            units: request.units,
             t: found.t,
             shown: if self.feedback == Loop::Open { "open" } else { "closed" },
             open: (found.open.work - found.planned.work, found.open.terminal_error),

@@ -18,7 +18,8 @@ use crate::verify::{relative, scale};
 impl Arguments {
     /// The protocol of a row of a table.
     pub(super) fn row_of(&self, name: &str) -> Result<TraceRequest, Failure> {
-        let is_own = |flag: &&String| !(*flag == "--t-f" && name == "step_response");
+        let is_own =
+            |flag: &&String| !matches!((flag.as_str(), name), ("--t-f", "step_response") | ("--disturb", "optimal"));
         if let Some(flag) = self.flags().iter().find(is_own) {
             let why = "not for a row of a dataset, which has its own parameters";
             return Err(wrong(format!("{flag}: {why}\n  help: remove {flag}")));
