@@ -16,7 +16,7 @@ use std::time::SystemTime;
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 
-use super::output::{self, Output};
+use super::output::Output;
 use super::watch;
 use super::{
     Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, say, stdout, summary, to_file, words, written,
@@ -54,18 +54,6 @@ enum Format {
     Jsonl,
     /// Parquet (.parquet)
     Parquet,
-}
-
-impl output::Format for Format {
-    const ENDINGS: &'static [(&'static str, Format)] = &[
-        ("csv", Format::Csv),
-        ("jsonl", Format::Jsonl),
-        ("ndjson", Format::Jsonl),
-        ("parquet", Format::Parquet),
-        ("txt", Format::Table),
-    ];
-    const TABLE: Format = Format::Table;
-    const PARQUET: Format = Format::Parquet;
 }
 
 /// Environment variable of the query process.
