@@ -7,14 +7,14 @@ use std::collections::HashSet;
 use std::ops::ControlFlow;
 
 use sqlparser::ast::{
-    BinaryOperator, DataType, ExactNumberInfo, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments,
-    GroupByExpr, Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, VisitorMut,
+    Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr, Ident, LimitClause, OrderByKind,
+    Query, Select, SelectItem, SetExpr, TableFactor, VisitorMut,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
 use super::Source;
-use super::checked_query::{binary, cast, is_one_of, name, whole_number};
+use super::checked_query::{is_one_of, name, parsed, whole_number};
 use super::filter::{Top, of_where};
 use super::groups::{Aggregate, GroupQuery, Kind, Measure};
 use super::scan::Files;
@@ -334,9 +334,8 @@ impl AggregateExtractor<'_> {
             _ => {
                 let sum = self.column(Measure::Sum, &format!("CAST({argument} AS DOUBLE)"), column);
                 let count = self.column(Measure::Count, &argument, column);
-                let count = cast(count, DataType::Double(ExactNumberInfo::None));
                 // The mean of no values is null, as their sum is.
-                Expr::Nested(Box::new(binary(sum, BinaryOperator::Divide, count)))
+                parsed(format!("({sum} / CAST({count} AS DOUBLE))"))
             }
         })
     }
