@@ -67,10 +67,7 @@ impl Absent {
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum QueryError {
-    /// The path leads to no table.
-    #[error("{path}: {found}\n  expected: {expected}\n  help: {help}")]
-    Path { path: String, found: String, expected: &'static str, help: String },
-    /// The query is not valid for these tables.
+    /// The path leads to no table, or the query is not valid for its tables.
     #[error("{found}\n  help: {help}")]
     Sql { found: String, help: String },
     /// A part is damaged, or belongs to another dataset.
@@ -105,7 +102,7 @@ impl QueryError {
 
     /// Whether the path or the query is wrong, rather than the files or the machine.
     pub fn is_wrong(&self) -> bool {
-        matches!(self, QueryError::Path { .. } | QueryError::Sql { .. })
+        matches!(self, QueryError::Sql { .. })
     }
 }
 
