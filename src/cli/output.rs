@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::{Failure, is_stdout, wrong};
+use crate::file;
 
 /// The endings of files and the names of their formats, those of a format together, the usual one first.
 const ENDINGS: [(&str, &str); 5] =
@@ -37,8 +38,8 @@ impl<F: ValueEnum + Copy + PartialEq + Send + Sync> Output<F> {
         let [parquet, table] = ["parquet", "table"].map(|name| F::from_str(name, false).ok());
         // The endings of the formats of this answer.
         let endings = || ENDINGS.iter().filter_map(|(ending, name)| Some((*ending, F::from_str(name, false).ok()?)));
-        let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let known = ending.and_then(|ending| endings().find(|(known, _)| *known == ending));
+        let ending = file::ending(&self.out);
+        let known = endings().find(|(known, _)| *known == ending);
         if let (Some(format), Some((ending, of_ending))) = (self.format, known)
             && (Some(format) == parquet) != (Some(of_ending) == parquet)
         {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::atomic;
 use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, Foreign, State};
-use crate::file;
+use crate::file::{self, sorted};
 
 /// The name of the file of the manifest.
 pub const MANIFEST: &str = "manifest.json";
@@ -270,14 +270,6 @@ impl Folder {
         let part = name(path).strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
         (part < table.parts && self.part(&table.name, part) == path).then_some(part)
     }
-}
-
-/// The `wanted` entries of a folder, by name; empty if it cannot be read.
-fn sorted(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| wanted(path)).collect();
-    paths.sort();
-    paths
 }
 
 /// The name of a file.

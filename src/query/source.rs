@@ -14,6 +14,7 @@ use super::scan::Files;
 use super::{Absent, Answer, QueryError, Tables};
 use crate::dataset::Folder;
 use crate::dataset::frame::{self, FrameError};
+use crate::file;
 use crate::sweep::path_hint;
 
 /// A table and its files.
@@ -94,10 +95,9 @@ pub fn open(path: &Path) -> Result<Tables, QueryError> {
     if !path.is_file() {
         return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));
     }
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-    match ending.as_deref() {
-        Some("parquet") => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
-        Some("csv") => Source::csv(path),
+    match file::ending(path).as_str() {
+        "parquet" => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
+        "csv" => Source::csv(path),
         _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
     }
     .map(Tables::of)
@@ -185,14 +185,10 @@ fn folder_above(path: &Path) -> Option<PathBuf> {
 
 /// The Parquet files in a folder, in the order of their names.
 fn parts(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_part = |path: &PathBuf| {
+    file::sorted(folder, |path| {
         let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
         !hidden && path.is_file() && path.extension().is_some_and(|ending| ending == "parquet")
-    };
-    let mut files: Vec<PathBuf> = entries.filter(is_part).collect();
-    files.sort();
-    files
+    })
 }
 
 /// The name of a file or folder as an identifier that needs no quotes in SQL.

@@ -29,12 +29,11 @@ use crate::table::{self, STATUS};
 /// A file that cannot be read, an unknown column, or an illegal value.
 pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let name = path.display();
-    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let file = check_size(path)?;
-    let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {
-        Some("csv") => csv(path, file, units)?,
+    let columns = match file::ending(path).as_str() {
+        "csv" => csv(path, file, units)?,
         // A panic of the reader on a damaged file is a fault of the file.
-        Some("parquet") => {
+        "parquet" => {
             guarded(|| parquet(path, file, units)).unwrap_or_else(|| Err(unreadable(path, &"it is damaged")))?
         }
         _ => {
