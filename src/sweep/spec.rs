@@ -32,26 +32,18 @@ pub struct Spec {
 }
 
 /// The keys of a spec, with those of its block at the top level.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 struct Written {
-    #[serde(default)]
     name: String,
-    #[serde(default)]
     description: String,
     points: Option<PathBuf>,
-    #[serde(default)]
     zip: Vec<Vec<String>>,
     r#where: Option<String>,
-    #[serde(default)]
     block: Vec<BlockSpec>,
-    #[serde(default)]
     model: ModelSpec,
-    #[serde(default)]
     accuracy: AccuracySpec,
-    #[serde(default)]
     axes: IndexMap<String, AxisSpec>,
-    #[serde(default)]
     tables: IndexMap<String, TableSpec>,
 }
 
