@@ -6,7 +6,7 @@ use super::block::Digit;
 use super::expression::Scratch;
 use super::quantity::{Point, Quantity};
 use super::row_index::{RowIndex, Tuples};
-use super::sampler::{BATCH_POINTS, Sampler};
+use super::sampler::Sampler;
 
 /// Rows of a table that are contiguous in the product of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,38 +89,28 @@ impl<'a> View<'a> {
             let values = (first..first + steps).map(|turn| axis.values.at(turn % digit.len)).collect();
             return Some(Runs { values, order: Order::Cyclic { digit, segment: segment.clone() } });
         }
-        let (mut values, mut starts) = (Vec::<f64>::new(), Vec::new());
-        let (mut scratch, mut rows) = (Scratch::default(), Vec::new());
-        // Adds the values at `rows` of the table, each with its row of the product; computed ones only where they differ.
-        let mut take = |sampler: &Sampler<'_>, rows: &mut Vec<(u64, u64)>, is_computed: bool| {
-            sampler.pick(&rows.iter().map(|(_, raw)| *raw).collect::<Vec<u64>>(), &mut scratch);
-            for ((row, _), &value) in rows.drain(..).zip(scratch.column(quantity)) {
-                if !is_computed || values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
+        let (mut values, mut starts, mut scratch) = (Vec::<f64>::new(), Vec::new(), Scratch::default());
+        for group in segments.chunk_by(|one, next| one.block == next.block) {
+            let block_rows = &blocks[group[0].block];
+            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
+            let stride = sampler.run().unwrap_or(u64::MAX);
+            // Where the value may change: rows of the table and of the product.
+            let (mut rows, mut raws) = (Vec::new(), Vec::new());
+            for segment in group {
+                let mut raw = segment.raw.start;
+                while raw < segment.raw.end {
+                    rows.push(segment.first + (raw - segment.raw.start));
+                    raws.push(raw);
+                    raw = (raw / stride + 1).saturating_mul(stride);
+                }
+            }
+            sampler.pick(&raws, &mut scratch);
+            for (row, &value) in rows.into_iter().zip(scratch.column(quantity)) {
+                if values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
                     values.push(value);
                     starts.push(row);
                 }
             }
-        };
-        for group in segments.chunk_by(|one, next| one.block == next.block) {
-            let block_rows = &blocks[group[0].block];
-            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
-            let (axis, mut last) = (block_rows.axis(quantity), None);
-            for segment in group {
-                let stride = sampler.run().unwrap_or(u64::MAX);
-                let mut raw = segment.raw.start;
-                while raw < segment.raw.end {
-                    let step = axis.map(|(digit, _)| digit.step(raw));
-                    if step.is_none() || step != last {
-                        rows.push((segment.first + (raw - segment.raw.start), raw));
-                    }
-                    last = step;
-                    raw = (raw / stride + 1).saturating_mul(stride);
-                }
-                if rows.len() as u64 >= BATCH_POINTS {
-                    take(&sampler, &mut rows, axis.is_none());
-                }
-            }
-            take(&sampler, &mut rows, axis.is_none());
         }
         Some(Runs { values, order: Order::Listed(starts) })
     }
@@ -176,7 +166,7 @@ enum Order {
 }
 
 impl Runs {
-    /// The values in the order of their first row: one for each step of a factor axis, else one for each run.
+    /// The values in the order of their first row: one for each step of a factor axis over one segment, else one for each run.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
