@@ -6,7 +6,6 @@ mod cell;
 mod checksum;
 mod chunk;
 mod dictionary;
-mod flags;
 mod folder;
 mod footer;
 #[cfg(feature = "read")]
