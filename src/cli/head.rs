@@ -107,10 +107,10 @@ fn heads(arguments: &Arguments) -> Result<Vec<Result<Head, Failure>>, Failure> {
             return Ok(None);
         };
         let headings = frame::headings(first).map_err(Failure::failed)?.0;
-        let frame = frame::first(first, arguments.rows as usize).map_err(Failure::failed)?;
+        let frame = frame::read_all(first).map_err(Failure::failed)?;
         let cells = |row: usize| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect();
         let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
-        let lines = words::headed(names, units, (0..frame.height).map(cells).collect());
+        let lines = words::headed(names, units, (0..frame.height).take(arguments.rows as usize).map(cells).collect());
         Ok(Some(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing }))
     };
     Ok(chosen(arguments, &names)?.into_iter().filter_map(|place| first(place).transpose()).collect())

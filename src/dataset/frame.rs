@@ -159,14 +159,6 @@ pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
 }
 
-/// All columns of the first `count` rows of a Parquet file.
-///
-/// # Errors
-/// If the file cannot be read.
-pub fn first(path: &Path, count: usize) -> Result<Frame, FrameError> {
-    open(path, None, |all| all.with_limit(count))
-}
-
 /// The columns `names` of a file. `ProjectionMask::columns` takes a dot in a name as the name of a field of a group.
 pub fn projection(schema: &SchemaDescriptor, names: &[&str]) -> ProjectionMask {
     let fields = schema.root_schema().get_fields().iter().enumerate();
