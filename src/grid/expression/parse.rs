@@ -11,7 +11,7 @@ use sqlparser::tokenizer::Token;
 use super::super::block::Factor;
 use super::super::quantity::Quantity;
 use super::program::{Binary, Expression, Op, Unary};
-use crate::names::nearest;
+use crate::names::hint_or;
 
 /// Greatest length of an expression, in bytes. Chosen: a few lines of text. It bounds memory and depth.
 const MAX_BYTES: usize = 1000;
@@ -59,8 +59,7 @@ impl Fault {
 
     /// The fault of a name that is not in `known`.
     fn unknown(position: Option<u64>, what: &str, name: &str, known: &[&str]) -> Fault {
-        let meant = nearest(name, known.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
-        let help = meant.unwrap_or_else(|| "remove it, or choose one of these".to_owned());
+        let help = hint_or(name, known.iter().copied(), "remove it, or choose one of these");
         let shown = known[..known.len().min(MAX_SHOWN_NAMES)].join(", ");
         let expected = if known.len() > MAX_SHOWN_NAMES { format!("{shown}, ...") } else { shown };
         Fault::new(position, format!("unknown {what} `{name}`"), expected, help)
