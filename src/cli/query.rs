@@ -7,7 +7,7 @@ use std::env;
 use std::fs;
 use std::io::{self, BufWriter, IsTerminal, Read, Write};
 use std::mem;
-use std::panic::{self, AssertUnwindSafe};
+use std::panic;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStdout, Command, ExitStatus, Stdio};
 use std::thread;
@@ -195,10 +195,9 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     };
     thread::Builder::new().spawn(watch).map_err(no_thread)?;
     thread::scope(|scope| {
-        let work = || panic::catch_unwind(AssertUnwindSafe(|| answer(arguments)));
+        let work = || answer(arguments);
         let thread = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work).map_err(no_thread)?;
-        let done = thread.join().and_then(|done| done);
-        done.unwrap_or_else(|_| {
+        thread.join().unwrap_or_else(|_| {
             Err(Failure::failed("the query failed: it is not supported\n  help: rewrite the query"))
         })
     })

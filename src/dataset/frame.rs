@@ -21,15 +21,13 @@ use crate::file;
 /// Rows decoded in one batch. Chosen: a batch fits the cache of a core.
 const ROWS_AT_ONCE: usize = 1 << 14;
 
-/// Name, unit and meaning of a column of a file.
+/// Name and unit of a column of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
     /// Its name.
     pub name: String,
     /// Its unit; empty for words and flags.
     pub unit: String,
-    /// Its meaning.
-    pub doc: String,
     /// Whether it contains numbers; otherwise words, or flags as `true` and `false`.
     pub is_number: bool,
 }
@@ -99,9 +97,9 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
     };
     let (schema, entries) = sound(read).map_err(|error| wrong(path, error))?;
     let heading = |field: &arrow_schema::FieldRef| {
-        let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
+        let unit = field.metadata().get("unit").cloned().unwrap_or_default();
         let is_number = field.data_type().is_numeric();
-        Heading { name: field.name().clone(), unit: entry("unit"), doc: entry("description"), is_number }
+        Heading { name: field.name().clone(), unit, is_number }
     };
     let entries = entries.into_iter().filter_map(|entry| Some((entry.key, entry.value?))).collect();
     Ok((schema.fields().iter().map(heading).collect(), entries))
