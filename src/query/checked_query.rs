@@ -389,13 +389,17 @@ fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
 
 /// Whether a condition contains only comparisons of columns with columns by `=`.
 fn is_equalities(condition: &Expr) -> bool {
-    let is_column = |side: &Expr| matches!(side, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
     match condition {
         Expr::Nested(inner) => is_equalities(inner),
         Expr::BinaryOp { left, op: BinaryOperator::And, right } => is_equalities(left) && is_equalities(right),
-        Expr::BinaryOp { left, op: BinaryOperator::Eq, right } => is_column(left) && is_column(right),
+        Expr::BinaryOp { left, op: BinaryOperator::Eq, right } => is_name(left) && is_name(right),
         _ => false,
     }
+}
+
+/// Whether an expression is the name of a column.
+pub fn is_name(expression: &Expr) -> bool {
+    matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_))
 }
 
 /// Whether an expression is a column, or all or some columns.
@@ -447,8 +451,7 @@ impl VisitorMut for Names {
                 number += 1;
                 free = format!("{name}_{number}");
             }
-            let is_plain = matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
-            if !is_plain || number > 0 {
+            if !is_name(&expression) || number > 0 {
                 *item = SelectItem::ExprWithAlias { expr: expression, alias: Ident::with_quote('"', free) };
             }
         }
@@ -456,7 +459,7 @@ impl VisitorMut for Names {
             return ControlFlow::Continue(());
         };
         for key in keys {
-            let is_plain = matches!(key.expr, Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Value(_));
+            let is_plain = is_name(&key.expr) || matches!(key.expr, Expr::Value(_));
             let same = select.projection.iter().find_map(|item| match item {
                 SelectItem::ExprWithAlias { expr, alias } if *expr == key.expr => Some(alias.clone()),
                 _ => None,
