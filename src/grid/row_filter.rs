@@ -196,7 +196,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
         batches(rows).find_map(|rows| {
             sampler.load(rows.clone(), scratch);
             let kept = block.condition.as_ref().map(|condition| condition.evaluate(scratch).to_vec());
-            let values = scratch.column(quantity);
+            let values = &scratch.quantities[quantity as usize];
             let is_found = |&i: &usize| kept.as_ref().is_none_or(|kept| kept[i] != 0.0) && wrong(values[i]);
             (0..values.len()).find(is_found).map(|place| rows.start + place as u64)
         })
@@ -205,6 +205,6 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     Some(found.map(|row| {
         let mut scratch = Scratch::default();
         sampler.pick(&[row], &mut scratch);
-        (scratch.column(quantity)[0], roots.iter().map(|root| (*root, scratch.column(*root)[0])).collect())
+        (scratch.quantities[quantity as usize][0], roots.iter().map(|root| (*root, scratch.quantities[*root as usize][0])).collect())
     }))
 }

@@ -68,7 +68,7 @@ impl<'a> View<'a> {
             let mut scratch = Scratch::default();
             Sampler::new(block, &block_rows.digits, &made, None).pick(&[segment.raw.start], &mut scratch);
             for quantity in made {
-                point[quantity] = scratch.column(quantity)[0];
+                point[quantity] = scratch.quantities[quantity as usize][0];
             }
         }
         point
@@ -105,7 +105,7 @@ impl<'a> View<'a> {
                 }
             }
             sampler.pick(&raws, &mut scratch);
-            for (row, &value) in rows.into_iter().zip(scratch.column(quantity)) {
+            for (row, &value) in rows.into_iter().zip(&scratch.quantities[quantity as usize]) {
                 if values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
                     values.push(value);
                     starts.push(row);
