@@ -45,15 +45,11 @@ pub struct Tables {
 pub struct Absent {
     /// Its name.
     pub name: String,
-    fault: Option<Arc<DatasetError>>,
+    /// The damage of a part.
+    pub fault: Option<Arc<DatasetError>>,
 }
 
 impl Absent {
-    /// Whether one of its parts is damaged.
-    pub fn is_damaged(&self) -> bool {
-        self.fault.is_some()
-    }
-
     /// Why it cannot be read.
     pub fn error(&self) -> QueryError {
         match &self.fault {

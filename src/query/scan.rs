@@ -33,7 +33,8 @@ use crate::dataset::{self, label};
 #[derive(Clone)]
 pub struct Files {
     paths: Vec<PathBuf>,
-    schema: SchemaRef,
+    /// Its columns and their types.
+    pub schema: SchemaRef,
     /// The condition of rows; others are skipped.
     conditions: Vec<Condition>,
     /// The order of rows, if only the first are needed.
@@ -50,11 +51,6 @@ impl Files {
             }
         }
         Ok(Files { paths, schema: Arc::new(schema), conditions: Vec::new(), top: None })
-    }
-
-    /// Its columns and their types.
-    pub fn schema(&self) -> &Schema {
-        &self.schema
     }
 
     /// Restricts the table to rows that match `conditions`, and in each part to rows that may be among the first.

@@ -9,9 +9,8 @@ use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult}
 use polars_io::SerReader;
 use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 
-use super::comparisons::Comparisons;
 use super::scan::Files;
-use super::{Absent, Answer, QueryError, Tables};
+use super::{Absent, QueryError, Tables};
 use crate::dataset::Folder;
 use crate::dataset::frame::{self, FrameError};
 use crate::file;
@@ -139,17 +138,6 @@ impl Source {
             files: None,
             frame: frame.lazy(),
         })
-    }
-
-    /// The first `count` rows.
-    ///
-    /// # Errors
-    ///
-    /// If the table cannot be read.
-    pub fn first(&self, count: u32) -> Result<Answer, QueryError> {
-        let (columns, units) = (self.columns.clone(), self.units.clone());
-        let frame = self.frame.clone().limit(count);
-        Ok(Answer { columns, units, comparisons: Comparisons::default(), frame, streaming: None })
     }
 }
 

@@ -91,7 +91,7 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     if !modifiers.is_empty() {
         return None;
     }
-    let conditions = of_where(select.selection.as_ref(), files.schema());
+    let conditions = of_where(select.selection.as_ref(), &files.schema);
     let condition = select.selection.map(|condition| condition.to_string());
     let table_query = TableQuery { source, items, condition, having: select.having, ordered };
     let (partial, groups, top) = if groups.is_empty() && !plain.aggregates {
@@ -233,7 +233,7 @@ impl TableQuery<'_> {
     /// The rows of a part that may be among the first `most`, if the first of `keys` is a column of numbers.
     fn top(&self, keys: &[Key], most: usize, files: &Files) -> Option<Top> {
         let (column, key) = (column_name(self.ordered.first()?)?.to_owned(), *keys.first()?);
-        let is_number = Kind::of(&column, files.schema()) == Some(Kind::Number);
+        let is_number = Kind::of(&column, &files.schema) == Some(Kind::Number);
         is_number.then_some(Top { column, key, most, is_only_key: keys.len() == 1 })
     }
 
@@ -246,7 +246,7 @@ impl TableQuery<'_> {
 
     /// The query for the groups of a part, and the plan that computes the answer from them.
     fn groups(&self, groups: Vec<Expr>, files: &Files) -> Option<(String, GroupPlan)> {
-        let is_column = |group: &Expr| column_name(group).is_some_and(|name| files.schema().contains(name));
+        let is_column = |group: &Expr| column_name(group).is_some_and(|name| files.schema.contains(name));
         let key = |group: Expr| if is_column(&group) { group } else { item(&group, &self.items).unwrap_or(group) };
         let keys: Vec<Expr> = groups.into_iter().map(key).collect();
         let mut lift = AggregateExtractor { keys: &keys, aggregates: Vec::new() };
@@ -275,7 +275,7 @@ impl TableQuery<'_> {
         let finish = sql(&columns, PARTS, &[("WHERE", having.as_slice()), ("ORDER BY", order)]);
         let merge = sql(&merged, PARTS, &[("GROUP BY", &names)]);
         let plain = keys.iter().map(|key| column_name(key).map(str::to_owned)).collect::<Option<Vec<_>>>();
-        let columns = plain.and_then(|keys| GroupQuery::new(keys, aggregates, files.schema()));
+        let columns = plain.and_then(|keys| GroupQuery::new(keys, aggregates, &files.schema));
         Some((sql(&found, &self.source.name, &partial), GroupPlan { columns, merge, finish }))
     }
 }
