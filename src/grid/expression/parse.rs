@@ -85,6 +85,21 @@ const FUNCTIONS: [(&str, Op); 15] = [
     ("power", Op::Binary(Binary::Power)),
 ];
 
+/// Operators but for equality, with the types of their operands and of their value.
+const OPERATORS: [(BinaryOperator, Binary, Kind, Kind); 11] = [
+    (BinaryOperator::Plus, Binary::Add, Kind::Number, Kind::Number),
+    (BinaryOperator::Minus, Binary::Subtract, Kind::Number, Kind::Number),
+    (BinaryOperator::Multiply, Binary::Multiply, Kind::Number, Kind::Number),
+    (BinaryOperator::Divide, Binary::Divide, Kind::Number, Kind::Number),
+    (BinaryOperator::PGExp, Binary::Power, Kind::Number, Kind::Number),
+    (BinaryOperator::Lt, Binary::Less, Kind::Number, Kind::Truth),
+    (BinaryOperator::LtEq, Binary::LessEqual, Kind::Number, Kind::Truth),
+    (BinaryOperator::Gt, Binary::Greater, Kind::Number, Kind::Truth),
+    (BinaryOperator::GtEq, Binary::GreaterEqual, Kind::Number, Kind::Truth),
+    (BinaryOperator::And, Binary::And, Kind::Truth, Kind::Truth),
+    (BinaryOperator::Or, Binary::Or, Kind::Truth, Kind::Truth),
+];
+
 /// The grammar, for messages.
 const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (...), between, abs, sqrt, exp, ln (natural logarithm), \
                        log or log10 (to base 10), floor, ceil, min, max, pow";
@@ -336,42 +351,23 @@ impl Compiler<'_> {
     }
 
     fn binary(&mut self, whole: &Expr, left: &Expr, op: &BinaryOperator, right: &Expr) -> Result<Kind, Fault> {
-        let function = match op {
-            BinaryOperator::Plus => Binary::Add,
-            BinaryOperator::Minus => Binary::Subtract,
-            BinaryOperator::Multiply => Binary::Multiply,
-            BinaryOperator::Divide => Binary::Divide,
-            BinaryOperator::PGExp => {
-                if matches!(left, Expr::BinaryOp { op: BinaryOperator::PGExp, .. }) {
-                    let found = format!("`{whole}` can be read in two ways");
-                    return Err(Fault::new(position(whole), found, "one power", "add parentheses, as in `(2^3)^2`"));
-                }
-                Binary::Power
-            }
-            BinaryOperator::Lt => Binary::Less,
-            BinaryOperator::LtEq => Binary::LessEqual,
-            BinaryOperator::Gt => Binary::Greater,
-            BinaryOperator::GtEq => Binary::GreaterEqual,
-            BinaryOperator::Eq | BinaryOperator::NotEq => {
-                self.equal(left, right)?;
-                self.program.extend((*op == BinaryOperator::NotEq).then_some(Op::Unary(Unary::Not)));
-                return Ok(Kind::Truth);
-            }
-            BinaryOperator::And => Binary::And,
-            BinaryOperator::Or => Binary::Or,
-            _ => {
-                let help = match op {
-                    BinaryOperator::PGOverlap => "write `and`",
-                    BinaryOperator::StringConcat => "write `or`",
-                    _ => REMOVE,
-                };
-                return Err(Fault::new(None, format!("unexpected `{op}`"), GRAMMAR, help));
-            }
-        };
-        let (operands, kind) = match function {
-            Binary::And | Binary::Or => (Kind::Truth, Kind::Truth),
-            Binary::Less | Binary::LessEqual | Binary::Greater | Binary::GreaterEqual => (Kind::Number, Kind::Truth),
-            _ => (Kind::Number, Kind::Number),
+        if matches!(op, BinaryOperator::Eq | BinaryOperator::NotEq) {
+            self.equal(left, right)?;
+            self.program.extend((*op == BinaryOperator::NotEq).then_some(Op::Unary(Unary::Not)));
+            return Ok(Kind::Truth);
+        }
+        let is_power = |op: &BinaryOperator| *op == BinaryOperator::PGExp;
+        if is_power(op) && matches!(left, Expr::BinaryOp { op, .. } if is_power(op)) {
+            let found = format!("`{whole}` can be read in two ways");
+            return Err(Fault::new(position(whole), found, "one power", "add parentheses, as in `(2^3)^2`"));
+        }
+        let Some((_, function, operands, kind)) = OPERATORS.into_iter().find(|(known, ..)| known == op) else {
+            let help = match op {
+                BinaryOperator::PGOverlap => "write `and`",
+                BinaryOperator::StringConcat => "write `or`",
+                _ => REMOVE,
+            };
+            return Err(Fault::new(None, format!("unexpected `{op}`"), GRAMMAR, help));
         };
         self.operand(left, operands)?;
         self.operand(right, operands)?;
