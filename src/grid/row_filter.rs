@@ -63,11 +63,6 @@ impl RowFilter {
         Some(RowFilter { levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
 
-    /// Whether it keeps every row.
-    pub fn keeps_all(&self) -> bool {
-        self.kept.len() == self.combinations
-    }
-
     /// The number of kept rows.
     pub fn rows(&self) -> u64 {
         self.kept.len() * self.levels.iter().map(|level| level.free).product::<u64>()
