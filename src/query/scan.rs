@@ -105,7 +105,23 @@ impl Files {
         most: Option<usize>,
     ) -> PolarsResult<DataFrame> {
         let predicate = predicate.map(without_hints).transpose()?.flatten();
-        let frame = sound(path, || self.decode(path, names, predicate.as_ref(), most))?;
+        let mut conditions = self.conditions.clone();
+        conditions.extend(predicate.iter().flat_map(|predicate| of_predicate(predicate).0));
+        let names_read = names.iter().map(PlSmallStr::as_str).chain(self.top.iter().map(|top| top.column.as_str()));
+        // A filter drops rows, so more have to be read.
+        let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
+        let mut frame = self.empty(names)?;
+        let mut take = |batch: RecordBatch, mut kept: Vec<bool>| {
+            if let Some(top) = &self.top {
+                top.mark(&batch, &mut kept);
+            }
+            let batch = match kept.iter().all(|kept| *kept) {
+                true => batch,
+                false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
+            };
+            append(&mut frame, columns(&batch, names)?).map_err(foreign)
+        };
+        sound(path, || self.batches(path, names_read, &conditions, most, &mut take))?;
         match predicate {
             Some(predicate) => frame.lazy().filter(predicate).collect(),
             None => Ok(frame),
@@ -263,33 +279,6 @@ impl Files {
             take(batch, kept)?;
         }
         Ok(())
-    }
-
-    /// The columns `names` of the rows of a file that `predicate` may keep.
-    fn decode(
-        &self,
-        path: &Path,
-        names: &[PlSmallStr],
-        predicate: Option<&Expr>,
-        most: Option<usize>,
-    ) -> Result<DataFrame, ParquetError> {
-        let mut conditions = self.conditions.clone();
-        conditions.extend(predicate.into_iter().flat_map(|predicate| of_predicate(predicate).0));
-        let names_read = names.iter().map(PlSmallStr::as_str).chain(self.top.iter().map(|top| top.column.as_str()));
-        // A filter drops rows, so more have to be read.
-        let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
-        let mut frame = self.empty(names).map_err(foreign)?;
-        self.batches(path, names_read, &conditions, most, &mut |batch, mut kept| {
-            if let Some(top) = &self.top {
-                top.mark(&batch, &mut kept);
-            }
-            let batch = match kept.iter().all(|kept| *kept) {
-                true => batch,
-                false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
-            };
-            append(&mut frame, columns(&batch, names)?).map_err(foreign)
-        })?;
-        Ok(frame)
     }
 }
 
