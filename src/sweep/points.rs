@@ -274,7 +274,7 @@ fn parquet(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecEr
     let rows = reader.metadata().file_metadata().num_rows();
     check_count(path, usize::try_from(rows).unwrap_or(0))?;
     let mut columns = header(&name, reader.schema().fields().iter().map(|field| field.name().as_str()))?;
-    let reader = reader.with_batch_size(BATCH_ROWS).build().map_err(|error| unreadable(path, &error))?;
+    let reader = reader.build().map_err(|error| unreadable(path, &error))?;
     let mut first = 0;
     for batch in reader {
         let batch = batch.map_err(|error| unreadable(path, &error))?;
@@ -321,9 +321,6 @@ fn texts_of(column: &ArrayRef) -> impl Iterator<Item = Option<&str>> {
     let cell = move |key: Option<i32>| words.zip(key).map(|(words, key)| words.value(key as usize));
     column.into_iter().flat_map(|column| column.keys()).map(cell)
 }
-
-/// Rows of a record batch. Chosen: a column of them fits a cache of 512 KiB.
-const BATCH_ROWS: usize = 1 << 16;
 
 /// The values of a column of numbers; `None` for decimals and halves.
 fn numbers(column: &ArrayRef) -> Option<Vec<f64>> {
