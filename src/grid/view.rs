@@ -55,21 +55,9 @@ impl<'a> View<'a> {
     /// The values at `row`, one of the rows.
     pub fn point(&self, row: u64) -> Point {
         let mut point = Point::default();
-        if let Some(segment) = self.segments(row..row + 1).next() {
-            let block_rows = &self.row_index.blocks()[segment.block];
-            let block = &block_rows.block;
-            for digit in &block_rows.digits.digits {
-                for axis in &block.factors[digit.factor].axes {
-                    point[axis.quantity] = axis.values.at(digit.step(segment.raw.start));
-                }
-            }
-            let made = block.derived.iter().map(|derived| derived.quantity);
-            let made: Vec<Quantity> = made.filter(|quantity| block_rows.determines(*quantity)).collect();
-            let mut scratch = Scratch::default();
-            Sampler::new(block, &block_rows.digits, &made, None).pick(&[segment.raw.start], &mut scratch);
-            for quantity in made {
-                point[quantity] = scratch.quantities[quantity as usize][0];
-            }
+        for quantity in Quantity::ALL {
+            let value = self.runs(quantity, row..row + 1).and_then(|runs| runs.values().first().copied());
+            point[quantity] = value.unwrap_or(f64::NAN);
         }
         point
     }
