@@ -72,7 +72,7 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
                 page.picture(&figure.draw(if figure.columns > 1 { PAGE } else { COLUMN }));
                 figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));
             }
-            Err(error @ PlotError::Part(_)) => return Err(error.into()),
+            Err(error @ (PlotError::Part(_) | PlotError::Frame(_))) => return Err(error.into()),
             // The help of the message concerns single pictures.
             Err(error) => page.words(error.to_string().lines().next().unwrap_or_default()),
         }

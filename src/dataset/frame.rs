@@ -14,7 +14,6 @@ use parquet::schema::types::SchemaDescriptor;
 pub use super::cell::Cells;
 
 use super::cell::Cell;
-use super::folder::DatasetError;
 use super::guard::{coded, sound};
 use crate::file;
 
@@ -63,17 +62,6 @@ impl Frame {
 pub struct FrameError {
     pub path: String,
     pub reason: String,
-}
-
-/// The error of reading a part.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// A part is damaged, or belongs to another dataset.
-    #[error(transparent)]
-    Part(#[from] DatasetError),
-    /// A part is found to be damaged during reading.
-    #[error("{0}\n  help: run the sweep again; it recomputes damaged parts alone")]
-    Frame(#[from] FrameError),
 }
 
 fn wrong(path: &Path, reason: impl std::fmt::Display) -> FrameError {

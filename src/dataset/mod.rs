@@ -27,7 +27,7 @@ pub use cell::Cell;
 pub use folder::{DatasetError, Folder, MANIFEST};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
-pub use frame::{FrameError, ReadError, Row};
+pub use frame::{FrameError, Row};
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
 #[cfg(feature = "query")]
