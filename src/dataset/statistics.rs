@@ -15,7 +15,7 @@ use super::cell::{Cell, exact, first_row};
 use super::footer::StatusCounts;
 use super::layout::Layout;
 use super::numbers;
-use crate::grid::{Point, Quantity, RowIndex, Scale, View};
+use crate::grid::{Quantity, RowIndex, Scale, View};
 use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
 use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
@@ -235,18 +235,11 @@ fn predicted(
     let Some(prediction) = &layout.prediction else { return counted };
     let column = layout.columns.iter().zip(&buffer.columns).find(|(column, _)| column.name == prediction.column);
     let Some((Kind::Label(words), cells)) = column.map(|(column, cells)| (column.kind, cells)) else { return counted };
-    let mut axes: Vec<(Quantity, Vec<f64>)> = Vec::new();
-    for axis in prediction.axes {
-        let Some(runs) = view.runs(*axis, rows.clone()) else { continue };
-        let unit = axis.unit(Scale::Model);
-        axes.push((*axis, runs.map(|value| layout.units.scaled(unit, value)).cells(rows.clone())));
-    }
-    let mut point = Point::default();
-    for (place, cell) in cells.iter().enumerate() {
-        let found = if cell.is_nan() { None } else { words.get(*cell as usize) };
-        let Some(found) = found else { continue };
-        for (axis, values) in &axes {
-            point[*axis] = values.get(place).copied().unwrap_or(f64::NAN);
+    for (row, cell) in rows.clone().zip(cells).filter(|(_, cell)| !cell.is_nan()) {
+        let Some(found) = words.get(*cell as usize) else { continue };
+        let mut point = view.point(row);
+        for axis in prediction.axes {
+            point[*axis] = layout.units.scaled(axis.unit(Scale::Model), point[*axis]);
         }
         let of_predicted = counted.entry((prediction.word)(&point).to_owned()).or_default();
         *of_predicted.entry((*found).to_owned()).or_default() += 1;
