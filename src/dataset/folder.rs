@@ -15,6 +15,9 @@ use crate::file::{self, sorted};
 /// The name of the file of the manifest.
 pub const MANIFEST: &str = "manifest.json";
 
+/// Why a manifest without a file comes from the parts.
+pub(super) const MISSING: &str = "missing";
+
 /// The help if the folder contains another dataset.
 const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
 
@@ -129,7 +132,7 @@ impl Folder {
     pub fn manifest(&self) -> Result<Option<Manifest>, DatasetError> {
         let read = self.read_manifest();
         let why = match &read {
-            Ok(None) => "missing".to_owned(),
+            Ok(None) => MISSING.to_owned(),
             Err(DatasetError::Manifest { why, .. }) => format!("damaged: {why}"),
             _ => return read,
         };
@@ -152,7 +155,7 @@ impl Folder {
     }
 
     /// The manifest reconstructed from the parts, if any part can be read.
-    pub(super) fn manifest_of_parts(&self) -> Option<Manifest> {
+    fn manifest_of_parts(&self) -> Option<Manifest> {
         let first = |table: PathBuf| sorted(&table, is_part).into_iter().find_map(|part| state::footer_of(&part));
         let footers = sorted(&self.path, Path::is_dir).into_iter().filter_map(first);
         // Tables are only added, so the manifest with the most tables is the last one.

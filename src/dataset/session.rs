@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, SystemTime};
 
 use super::atomic;
-use super::folder::{DatasetError, Folder};
+use super::folder::{DatasetError, Folder, MISSING};
 use super::manifest::Manifest;
 
 /// A run that writes to a dataset.
@@ -56,35 +56,29 @@ impl Folder {
 
     /// The manifest that the folder needs for `planned`, and the required action.
     fn settle(&self, planned: &Manifest) -> Result<(Manifest, ManifestAction), DatasetError> {
-        let (found, mut action) = match self.read_manifest() {
-            Ok(Some(found)) => (Some(found), ManifestAction::Keep),
-            Ok(None) => {
-                let is_visible = |entry: fs::DirEntry| !entry.file_name().to_string_lossy().starts_with('.');
-                let occupied = fs::read_dir(self.path()).is_ok_and(|entries| entries.flatten().any(is_visible));
-                // Another run may just have published its manifest, which is its first file.
-                match (self.read_manifest()?, self.manifest_of_parts()) {
-                    (None, None) if occupied => {
-                        return Err(DatasetError::Occupied { folder: self.path().display().to_string() });
-                    }
-                    (None, rebuilt) => (rebuilt, ManifestAction::Create),
-                    (found, _) => (found, ManifestAction::Keep),
-                }
+        let found = match self.manifest() {
+            // Nothing is lost with it.
+            Err(DatasetError::Manifest { .. }) if !self.has_parts() => {
+                return Ok((planned.clone(), ManifestAction::Replace));
             }
-            Err(error @ DatasetError::Manifest { .. }) => match self.manifest_of_parts() {
-                // The origin of the parts is unknown.
-                None if self.has_parts() => return Err(error),
-                found => (found, ManifestAction::Replace),
-            },
-            Err(error) => return Err(error),
+            found => found?,
         };
-        let Some(found) = found else { return Ok((planned.clone(), action)) };
+        let Some(found) = found else {
+            let is_visible = |entry: fs::DirEntry| !entry.file_name().to_string_lossy().starts_with('.');
+            let occupied = fs::read_dir(self.path()).is_ok_and(|entries| entries.flatten().any(is_visible));
+            return match self.read_manifest()? {
+                // Another run has just published its manifest, which is its first file.
+                Some(_) => self.settle(planned),
+                None if occupied => Err(DatasetError::Occupied { folder: self.path().display().to_string() }),
+                None => Ok((planned.clone(), ManifestAction::Create)),
+            };
+        };
         self.compare(planned, &found)?;
-        if action == ManifestAction::Keep {
-            if found.covers(planned) {
-                return Ok((found, action));
-            }
-            action = ManifestAction::Replace;
-        }
+        let action = match found.rebuilt.as_deref() {
+            None if found.covers(planned) => return Ok((found, ManifestAction::Keep)),
+            Some(MISSING) => ManifestAction::Create,
+            _ => ManifestAction::Replace,
+        };
         let mut settled = if found.tables.len() > planned.tables.len() { found } else { planned.clone() };
         settled.rebuilt = None;
         if settled.spec.is_empty() {
