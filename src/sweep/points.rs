@@ -247,10 +247,7 @@ fn cells_of<'a>(place: &str, line: &'a str) -> Result<Vec<Cow<'a, str>>, SpecErr
             continue;
         };
         // A doubled quote is a quote.
-        let mut end = quoted.find('"');
-        while let Some(place) = end.filter(|place| quoted[place + 1..].starts_with('"')) {
-            end = quoted[place + 2..].find('"').map(|next| place + 2 + next);
-        }
+        let end = quoted.replace("\"\"", "__").find('"');
         let after = end.map(|end| (&quoted[..end], quoted[end + 1..].trim_start()));
         let Some((cell, after)) = after.filter(|(_, after)| after.is_empty() || after.starts_with(',')) else {
             let found = format!("{place}: the quote in `{line}` is not closed on its line");
