@@ -29,8 +29,7 @@ const GAP: &str = "gap";
 /// The statistics of some rows of a table.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableStatistics {
-    /// Rows by status, in the order of [`Status::ALL`]. A footer has a separate entry for them.
-    #[serde(skip)]
+    /// Rows by status, in the order of [`Status::ALL`].
     pub status: StatusCounts,
     /// All columns of the table: name and unit, empty for words.
     pub columns: Vec<(String, String)>,
