@@ -38,7 +38,6 @@ pub struct TableStatistics {
     /// The columns of words after the axes: each word and its number of rows.
     pub words: Vec<(String, Counts)>,
     /// The labels: each word and its number of rows; `None` for more than [`MAX_KEPT_ROWS`] words.
-    #[serde(default)]
     pub labels: Vec<(String, Option<Counts>)>,
     /// For a column with a prediction, the words found for each predicted word.
     pub predicted: BTreeMap<String, Counts>,
