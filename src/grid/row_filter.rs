@@ -200,6 +200,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     Some(found.map(|row| {
         let mut scratch = Scratch::default();
         sampler.pick(&[row], &mut scratch);
-        (scratch.quantities[quantity as usize][0], roots.iter().map(|root| (*root, scratch.quantities[*root as usize][0])).collect())
+        let value = |quantity: Quantity| scratch.quantities[quantity as usize][0];
+        (value(quantity), roots.iter().map(|root| (*root, value(*root))).collect())
     }))
 }

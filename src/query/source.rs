@@ -45,9 +45,8 @@ const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parq
 ///
 /// A path without tables, or a file that cannot be read.
 pub fn open(path: &Path) -> Result<Tables, QueryError> {
-    let wrong = |found: &str, help: &str| {
-        QueryError::sql(format!("{}: {found}\n  expected: {EXPECTED}", path.display()), help)
-    };
+    let wrong =
+        |found: &str, help: &str| QueryError::sql(format!("{}: {found}\n  expected: {EXPECTED}", path.display()), help);
     if path.is_dir() {
         // The folder of a table belongs to its dataset, and is checked like it.
         if let (Some(above), Some(name)) = (folder_above(path), path.file_name())

@@ -39,7 +39,8 @@ impl Spec {
                 }
             };
             let span = error.span().unwrap_or_default();
-            let has = |entry: &&Entry| [&entry.name, &entry.value.span()].iter().any(|written| written.contains(&span.start));
+            let has =
+                |entry: &&Entry| [&entry.name, &entry.value.span()].iter().any(|written| written.contains(&span.start));
             let entry = entries.iter().rfind(has);
             let key = entry.map(|entry| entry.key.clone()).unwrap_or_default();
             let entry = entry.map(|entry| entry.name.start..entry.value.span().end);
