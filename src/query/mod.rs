@@ -16,7 +16,6 @@ mod units;
 mod walk;
 
 use std::collections::HashSet;
-use std::path::Path;
 use std::sync::Arc;
 
 use indexmap::IndexSet;
@@ -119,19 +118,6 @@ fn sorted(frame: LazyFrame, schema: &Schema) -> LazyFrame {
 }
 
 impl Tables {
-    fn of(source: Source) -> Tables {
-        Tables { sources: vec![source], absent: Vec::new() }
-    }
-
-    /// Opens the tables of the dataset in `path`. A folder of Parquet files, or a Parquet or CSV file, is one table under its name.
-    ///
-    /// # Errors
-    ///
-    /// If there is no table, or if one of its files cannot be read.
-    pub fn open(path: &Path) -> Result<Tables, QueryError> {
-        source::open(path)
-    }
-
     /// The answer to a SQL query, computed when it is read.
     ///
     /// # Errors

@@ -39,66 +39,75 @@ pub struct Source {
 /// The tables of a query.
 const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parquet or CSV file";
 
-/// The tables in `path`.
-///
-/// # Errors
-///
-/// A path without tables, or a file that cannot be read.
-pub fn open(path: &Path) -> Result<Tables, QueryError> {
-    let wrong =
-        |found: &str, help: &str| QueryError::sql(format!("{}: {found}\n  expected: {EXPECTED}", path.display()), help);
-    if path.is_dir() {
-        // The folder of a table belongs to its dataset, and is checked like it.
-        if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
-            && let Ok(Some(_)) = Folder::at(&above).manifest()
-        {
-            let mut tables = open(&above)?;
-            tables.sources.retain(|source| *source.name == *name.to_string_lossy());
-            if !tables.sources.is_empty() {
-                return Ok(tables);
-            }
-        }
-        let folder = Folder::at(path);
-        let manifest = folder.manifest().map_err(|error| wrong(&error.to_string(), "name another folder"))?;
-        let Some(manifest) = manifest else {
-            let files = parts(path);
-            if files.is_empty() {
-                return Err(wrong(
-                    "holds neither a manifest.json nor Parquet files",
-                    "name a folder that `slipsweep run` wrote",
-                ));
-            }
-            return Source::parquet(path, name_of(path), files, 0, None).map(Tables::of);
+impl Tables {
+    /// Opens the tables of the dataset in `path`. A folder of Parquet files, or a Parquet or CSV file, is one table under its name.
+    ///
+    /// # Errors
+    ///
+    /// If there is no table, or if one of its files cannot be read.
+    pub fn open(path: &Path) -> Result<Tables, QueryError> {
+        let wrong = |found: &str, help: &str| {
+            QueryError::sql(format!("{}: {found}\n  expected: {EXPECTED}", path.display()), help)
         };
-        let (mut sources, mut absent) = (Vec::new(), Vec::new());
-        for table in &manifest.tables {
-            let name = table.name.clone();
-            match folder.verified(&manifest, table) {
-                Ok((files, _)) if files.is_empty() => absent.push(Absent { name, fault: None }),
-                Ok((files, missing)) => sources.push(Source::parquet(path, name, files, missing, Some(table.rows))?),
-                Err(fault) => absent.push(Absent { name, fault: Some(Arc::new(fault)) }),
+        if path.is_dir() {
+            // The folder of a table belongs to its dataset, and is checked like it.
+            if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
+                && let Ok(Some(_)) = Folder::at(&above).manifest()
+            {
+                let mut tables = Tables::open(&above)?;
+                tables.sources.retain(|source| *source.name == *name.to_string_lossy());
+                if !tables.sources.is_empty() {
+                    return Ok(tables);
+                }
             }
-        }
-        if sources.is_empty() {
-            if let Some(damaged) = absent.iter().find(|table| table.fault.is_some()) {
-                return Err(damaged.error());
+            let folder = Folder::at(path);
+            let manifest = folder.manifest().map_err(|error| wrong(&error.to_string(), "name another folder"))?;
+            let Some(manifest) = manifest else {
+                let files = parts(path);
+                if files.is_empty() {
+                    return Err(wrong(
+                        "holds neither a manifest.json nor Parquet files",
+                        "name a folder that `slipsweep run` wrote",
+                    ));
+                }
+                return Source::parquet(path, name_of(path), files, 0, None).map(Tables::of);
+            };
+            let (mut sources, mut absent) = (Vec::new(), Vec::new());
+            for table in &manifest.tables {
+                let name = table.name.clone();
+                match folder.verified(&manifest, table) {
+                    Ok((files, _)) if files.is_empty() => absent.push(Absent { name, fault: None }),
+                    Ok((files, missing)) => {
+                        sources.push(Source::parquet(path, name, files, missing, Some(table.rows))?)
+                    }
+                    Err(fault) => absent.push(Absent { name, fault: Some(Arc::new(fault)) }),
+                }
             }
-            return Err(wrong("the dataset has no parts yet", "compute them with `slipsweep run`"));
+            if sources.is_empty() {
+                if let Some(damaged) = absent.iter().find(|table| table.fault.is_some()) {
+                    return Err(damaged.error());
+                }
+                return Err(wrong("the dataset has no parts yet", "compute them with `slipsweep run`"));
+            }
+            return Ok(Tables { sources, absent });
         }
-        return Ok(Tables { sources, absent });
+        if !path.exists() {
+            return Err(wrong("there is no such file or folder", &path_hint(path, "")));
+        }
+        if !path.is_file() {
+            return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));
+        }
+        match file::ending(path).as_str() {
+            "parquet" => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
+            "csv" => Source::csv(path),
+            _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
+        }
+        .map(Tables::of)
     }
-    if !path.exists() {
-        return Err(wrong("there is no such file or folder", &path_hint(path, "")));
+
+    fn of(source: Source) -> Tables {
+        Tables { sources: vec![source], absent: Vec::new() }
     }
-    if !path.is_file() {
-        return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));
-    }
-    match file::ending(path).as_str() {
-        "parquet" => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
-        "csv" => Source::csv(path),
-        _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
-    }
-    .map(Tables::of)
 }
 
 impl Source {
