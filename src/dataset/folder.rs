@@ -205,11 +205,6 @@ impl Folder {
         parts
     }
 
-    /// The state of a part in the dataset of `manifest`.
-    pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
-        state::state(&self.part(table, part), manifest, table, part, look)
-    }
-
     /// The paths of the present parts of `table` in order, and the number of missing parts. The footer of each part is verified here, its pages when they are read.
     ///
     /// # Errors
