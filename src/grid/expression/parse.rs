@@ -111,12 +111,7 @@ impl Expression {
     ///
     /// A text that is not a number computed from `axes`.
     pub fn number(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
-        let (expression, kind) = read(text, axes, None)?;
-        if kind == Kind::Number {
-            return Ok(expression);
-        }
-        let help = "use it in `where`, or compute a number";
-        Err(Fault::new(None, format!("`{text}` is true or false"), "a number", help))
+        read(text, axes, None, Kind::Number)
     }
 
     /// Parses a condition on `axes` and on the labels of `points`.
@@ -125,11 +120,7 @@ impl Expression {
     ///
     /// A text that is not a condition on `axes` and labels.
     pub fn condition(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<Expression, Fault> {
-        let (expression, kind) = read(text, axes, points)?;
-        if kind == Kind::Truth {
-            return Ok(expression);
-        }
-        Err(Fault::new(None, format!("`{text}` is a number"), "true or false", "compare it, as in `v_f > v_i`"))
+        read(text, axes, points, Kind::Truth)
     }
 }
 
@@ -140,8 +131,14 @@ enum Kind {
     Truth,
 }
 
-fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
-    parse(text, axes, points).map_err(|fault| fault.located(text))
+fn read(text: &str, axes: &[Quantity], points: Option<&Factor>, wanted: Kind) -> Result<Expression, Fault> {
+    let (expression, kind) = parse(text, axes, points).map_err(|fault| fault.located(text))?;
+    let (is, expected, help) = match kind {
+        kind if kind == wanted => return Ok(expression),
+        Kind::Truth => ("true or false", "a number", "use it in `where`, or compute a number"),
+        Kind::Number => ("a number", "true or false", "compare it, as in `v_f > v_i`"),
+    };
+    Err(Fault::new(None, format!("`{text}` is {is}"), expected, help))
 }
 
 fn parse(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
