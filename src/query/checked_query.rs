@@ -280,7 +280,7 @@ fn is_empty(group_by: &GroupByExpr) -> bool {
 }
 
 /// The expression of an item of SELECT.
-fn expression(item: &SelectItem) -> Option<&Expr> {
+pub fn expression(item: &SelectItem) -> Option<&Expr> {
     match item {
         SelectItem::UnnamedExpr(expression) | SelectItem::ExprWithAlias { expr: expression, .. } => Some(expression),
         _ => None,
@@ -288,7 +288,7 @@ fn expression(item: &SelectItem) -> Option<&Expr> {
 }
 
 /// The name of an item of SELECT; empty for several columns.
-fn item_name(item: &SelectItem) -> String {
+pub fn item_name(item: &SelectItem) -> String {
     match item {
         SelectItem::UnnamedExpr(expression) => name(expression),
         SelectItem::ExprWithAlias { alias, .. } => alias.value.clone(),

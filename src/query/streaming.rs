@@ -14,7 +14,7 @@ use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
 use super::Source;
-use super::checked_query::{is_one_of, name, parsed, whole_number};
+use super::checked_query::{expression, is_one_of, item_name, parsed, whole_number};
 use super::filter::{Top, of_where};
 use super::groups::{Aggregate, GroupQuery, Kind, Measure};
 use super::scan::Files;
@@ -165,12 +165,10 @@ fn items(select: &Select, source: &Source) -> Option<Vec<(String, Expr)>> {
     let mut items = Vec::new();
     for item in &select.projection {
         match item {
-            SelectItem::UnnamedExpr(expression) => items.push((name(expression), expression.clone())),
-            SelectItem::ExprWithAlias { expr, alias } => items.push((alias.value.clone(), expr.clone())),
             SelectItem::Wildcard(options) if options.to_string().is_empty() => {
                 items.extend(source.columns.iter().map(|column| (column.clone(), quoted(column))));
             }
-            _ => return None,
+            item => items.push((item_name(item), expression(item)?.clone())),
         }
     }
     let mut names = HashSet::new();
