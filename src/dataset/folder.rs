@@ -170,9 +170,14 @@ impl Folder {
     /// Checks that a run of `expected` may write to the dataset of `found`.
     pub(super) fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
         let folder = self.path.display().to_string();
-        if let Some((what, here, there)) = expected.build.difference(&found.build) {
-            let expected = format!("{here}, of this program");
-            return Err(DatasetError::Foreign { folder, what, expected, found: there.to_owned() });
+        let (ours, theirs) = (&expected.build, &found.build);
+        for (what, here, there) in
+            [("version", &ours.version, &theirs.version), ("numerics revision", &ours.revision, &theirs.revision)]
+        {
+            if here != there {
+                let expected = format!("{here}, of this program");
+                return Err(DatasetError::Foreign { folder, what, expected, found: there.clone() });
+            }
         }
         for table in &expected.tables {
             if let Some(other) = found.table(&table.name)
