@@ -205,15 +205,12 @@ impl Tables {
     /// The columns of words that a query names.
     fn words(&self, sql: &str, checked: &CheckedQuery) -> Vec<String> {
         let named: HashSet<&str> = sql.split(|letter: char| !(letter.is_alphanumeric() || letter == '_')).collect();
-        let read = self.sources.iter().filter(|source| checked.read.contains(&source.name));
-        let schemas = read.filter_map(|source| source.frame.clone().collect_schema().ok());
-        let words: IndexSet<String> = schemas
-            .flat_map(|schema| {
-                let words = schema.iter().filter(|(_, kind)| kind.is_categorical() || kind.is_string());
-                words.map(|(name, _)| name.to_string()).collect::<Vec<_>>()
-            })
-            .filter(|name| named.contains(name.as_str()))
-            .collect();
+        let mut words = IndexSet::new();
+        for source in self.sources.iter().filter(|source| checked.read.contains(&source.name)) {
+            let Ok(schema) = source.frame.clone().collect_schema() else { continue };
+            let of_words = schema.iter().filter(|(_, kind)| kind.is_categorical() || kind.is_string());
+            words.extend(of_words.map(|(name, _)| name.to_string()).filter(|name| named.contains(name.as_str())));
+        }
         words.into_iter().collect()
     }
 
