@@ -87,7 +87,9 @@ impl Files {
 
     /// Each file as a separate table.
     pub fn parts(&self) -> Vec<Files> {
-        self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
+        // Without all paths in each clone.
+        let none = Files { paths: Vec::new(), ..self.clone() };
+        self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..none.clone() }).collect()
     }
 
     /// The columns `names` without rows.
