@@ -17,8 +17,6 @@ pub struct Session {
     folder: Folder,
     /// The current manifest.
     pub manifest: Manifest,
-    /// The tables of this run.
-    planned: Manifest,
     _lock: Option<Lock>,
 }
 
@@ -49,7 +47,7 @@ impl Folder {
             atomic::create_folder(&folder)?;
             atomic::sweep(&folder, now);
         }
-        let session = Session { folder: self.clone(), manifest, planned: planned.clone(), _lock: lock };
+        let session = Session { folder: self.clone(), manifest, _lock: lock };
         session.check()?;
         Ok(session)
     }
@@ -134,7 +132,7 @@ impl Session {
     /// If it has been removed or replaced.
     pub fn check(&self) -> Result<(), DatasetError> {
         match self.folder.read_manifest() {
-            Ok(Some(found)) if found.covers(&self.planned) => Ok(()),
+            Ok(Some(found)) if found.covers(&self.manifest) => Ok(()),
             Ok(None) => Err(self.folder.taken("manifest.json was removed")),
             _ => Err(self.folder.taken("manifest.json was replaced by another one")),
         }
