@@ -75,9 +75,9 @@ impl<'a> Sampler<'a> {
         Sampler { sources, derived }
     }
 
-    /// The length of runs with constant quantities, in rows, from a multiple of this number; `None` if they never change.
-    pub fn run(&self) -> Option<u64> {
-        self.sources.iter().map(|source| source.digit.stride).min()
+    /// The length of runs with constant quantities, in rows, from a multiple of this number.
+    pub fn run(&self) -> u64 {
+        self.sources.iter().map(|source| source.digit.stride).min().unwrap_or(u64::MAX)
     }
 
     /// Evaluates consecutive rows.

@@ -81,7 +81,7 @@ impl<'a> View<'a> {
         for group in segments.chunk_by(|one, next| one.block == next.block) {
             let block_rows = &blocks[group[0].block];
             let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
-            let stride = sampler.run().unwrap_or(u64::MAX);
+            let stride = sampler.run();
             // Where the value may change: rows of the table and of the product.
             let (mut rows, mut raws) = (Vec::new(), Vec::new());
             for segment in group {

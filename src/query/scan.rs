@@ -25,7 +25,7 @@ use polars::prelude::{
 };
 use rayon::prelude::*;
 
-use super::filter::{Condition, Top, kept, of_predicate};
+use super::filter::{Condition, Top, of_predicate};
 use super::groups::{GroupAggregation, GroupQuery};
 use crate::dataset::{self, label};
 
@@ -277,7 +277,8 @@ impl Files {
         }
         for batch in builder.build()? {
             let batch = batch?;
-            let kept = kept(conditions, &batch);
+            let mut kept = vec![true; batch.num_rows()];
+            conditions.iter().for_each(|condition| condition.mark(&batch, &mut kept));
             take(batch, kept)?;
         }
         Ok(())

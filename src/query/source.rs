@@ -51,7 +51,8 @@ impl Tables {
         };
         if path.is_dir() {
             // The folder of a table belongs to its dataset, and is checked like it.
-            if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
+            let above = fs::canonicalize(path).ok().and_then(|real| real.parent().map(Path::to_owned));
+            if let (Some(above), Some(name)) = (above, path.file_name())
                 && let Ok(Some(_)) = Folder::at(&above).manifest()
             {
                 let mut tables = Tables::open(&above)?;
@@ -172,11 +173,6 @@ fn csv(path: &Path) -> PolarsResult<(DataFrame, Option<Vec<String>>)> {
     let units = comments.into_iter().find_map(|line| line.strip_prefix(b"# units = "));
     let units = units.map(|units| String::from_utf8_lossy(units).trim_end().split(", ").map(str::to_owned).collect());
     Ok((CsvReader::new(Cursor::new(&bytes)).with_options(options).finish()?, units))
-}
-
-/// The folder that a folder is in.
-fn folder_above(path: &Path) -> Option<PathBuf> {
-    Some(fs::canonicalize(path).ok()?.parent()?.to_owned())
 }
 
 /// The Parquet files in a folder, in the order of their names.

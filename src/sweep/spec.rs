@@ -186,9 +186,6 @@ pub struct TableSpec {
     pub reduce: Option<String>,
 }
 
-/// The legal forms of an axis of numbers.
-pub const AXIS: &str = "a number, a list of numbers or a range such as { linspace = [first, last, count] }";
-
 impl<'de> Deserialize<'de> for AxisSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<AxisSpec, D::Error> {
         struct Forms;
@@ -197,7 +194,7 @@ impl<'de> Deserialize<'de> for AxisSpec {
             type Value = AxisSpec;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(AXIS)
+                f.write_str("a number, a list of numbers or a range such as { linspace = [first, last, count] }")
             }
 
             fn visit_i64<E>(self, number: i64) -> Result<AxisSpec, E> {
