@@ -77,13 +77,15 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     near.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
+/// The help for `name`, which is not in `known`; `other` if nothing similar is.
+pub fn hint_or<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, other: &str) -> String {
+    nearest(name, known).map_or_else(|| other.to_owned(), |meant| format!("did you mean `{meant}`?"))
+}
+
 /// The help for `name`, which is not in `known`.
 #[cfg(any(feature = "plot", feature = "query"))]
 pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
-    match nearest(name, known) {
-        Some(meant) => format!("did you mean `{meant}`?"),
-        None => "choose one of these".to_owned(),
-    }
+    hint_or(name, known, "choose one of these")
 }
 
 #[cfg(test)]

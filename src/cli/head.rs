@@ -63,17 +63,18 @@ pub fn head(arguments: &Arguments) -> Result<(), Failure> {
 /// The first rows of tables of a dataset or of a file.
 #[cfg(feature = "query")]
 fn heads(arguments: &Arguments) -> Result<Vec<Result<Head, Failure>>, Failure> {
-    let Tables { sources, absent } = Tables::open(&arguments.dataset)?;
+    let tables = Tables::open(&arguments.dataset)?;
+    let Tables { sources, absent } = &tables;
     let names = sources.iter().map(|source| &source.name).chain(absent.iter().map(|table| &table.name));
     let wanted = chosen(arguments, &names.map(String::as_str).collect::<Vec<_>>())?;
     let first = |source: &Source| {
-        let mut rows = Vec::new();
-        let first = source.first(arguments.rows)?.rows(|piece| {
-            rows.extend(piece.iter().map(|row| row.iter().map(summary::shown).collect()));
+        let answer = tables.query(&format!("SELECT * FROM \"{}\" LIMIT {}", source.name, arguments.rows))?;
+        let mut lines = words::headed(answer.columns.clone(), answer.units.clone(), Vec::new());
+        let first = answer.rows(|rows| {
+            lines.extend(rows.iter().map(|row| row.iter().map(summary::shown).collect()));
             Ok(())
         });
         first.map_err(|error| unreadable(&arguments.dataset, &error))?;
-        let lines = words::headed(source.columns.clone(), source.units.clone(), rows);
         Ok(Head { name: source.name.clone(), lines, rows: source.rows, missing: source.missing })
     };
     Ok(wanted
@@ -82,7 +83,7 @@ fn heads(arguments: &Arguments) -> Result<Vec<Result<Head, Failure>>, Failure> {
             Some(source) => Some(first(source)),
             None => {
                 let table = &absent[place - sources.len()];
-                if arguments.table.is_none() && !table.is_damaged() {
+                if arguments.table.is_none() && table.fault.is_none() {
                     note(format!("`{}` has no parts yet; `slipsweep run` computes them", table.name));
                     return None;
                 }
@@ -107,10 +108,10 @@ fn heads(arguments: &Arguments) -> Result<Vec<Result<Head, Failure>>, Failure> {
             return Ok(None);
         };
         let headings = frame::headings(first).map_err(Failure::failed)?.0;
-        let frame = frame::first(first, arguments.rows as usize).map_err(Failure::failed)?;
+        let frame = frame::read_all(first).map_err(Failure::failed)?;
         let cells = |row: usize| frame.row(row).iter().map(|(_, cell)| summary::shown(cell)).collect();
         let (names, units) = headings.into_iter().map(|heading| (heading.name, heading.unit)).unzip();
-        let lines = words::headed(names, units, (0..frame.height).map(cells).collect());
+        let lines = words::headed(names, units, (0..frame.height).take(arguments.rows as usize).map(cells).collect());
         Ok(Some(Head { name: table.name.clone(), lines, rows: Some(table.rows), missing }))
     };
     Ok(chosen(arguments, &names)?.into_iter().filter_map(|place| first(place).transpose()).collect())

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use super::{Failure, cannot_write, refused, say, to_file};
+use super::{Failure, refused, say, write_file};
 use crate::file;
 use crate::sweep::{check_name, schema};
 
@@ -81,17 +81,13 @@ pub fn init(arguments: &Arguments) -> Result<(), Failure> {
         let found = format!("{}: exists already", path.display());
         return Err(refused(found, "a new name", "choose another name, or remove the file"));
     }
-    let write = |path: &Path, text: &str| {
-        let written = to_file(path, |file| file.write_all(text.as_bytes()));
-        written.map_err(|error: io::Error| cannot_write(path, &error))
-    };
     let schema_path = folder.join(SCHEMA);
     let schema = format!("{:#}\n", schema());
     // A schema of another version would report valid keys of this version as errors.
     if !has(&schema_path, &schema) {
-        write(&schema_path, &schema)?;
+        write_file(&schema_path, schema.as_bytes())?;
     }
-    write(&path, &text)?;
+    write_file(&path, text.as_bytes())?;
     let path = path.display();
     say(&format!(
         "written: {path}, a commented spec, and {SCHEMA}, its schema for editors\n\

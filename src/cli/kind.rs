@@ -1,12 +1,11 @@
 //! The kind of a path. If an argument has the wrong kind, the message names the command that accepts it.
 
-use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use super::{Failure, refused};
 use crate::dataset::{Folder, MANIFEST, frame};
-use crate::file;
+use crate::file::{self, ending};
 use crate::sweep::path_hint;
 
 /// Greatest number of datasets that a message lists. Chosen: they fit on a line.
@@ -53,11 +52,6 @@ impl Kind {
     }
 }
 
-/// The ending of the name of a file, in lower case.
-fn ending(path: &Path) -> String {
-    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase()
-}
-
 /// Whether a folder is a dataset: it has a manifest, or parts, which replace a lost one.
 pub fn is_dataset(folder: &Path) -> bool {
     folder.join(MANIFEST).exists() || matches!(Folder::at(folder).manifest(), Ok(Some(_)))
@@ -100,10 +94,7 @@ pub fn unexpected(path: &Path, kinds: &[Kind]) -> Failure {
 
 /// The datasets in a folder.
 fn datasets_in(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut datasets: Vec<PathBuf> = entries.filter(|folder| folder.join(MANIFEST).is_file()).collect();
-    datasets.sort();
-    datasets
+    file::sorted(folder, |folder| folder.join(MANIFEST).is_file())
 }
 
 /// A path of another kind in words, and the help for it where `kinds` are expected.

@@ -329,7 +329,6 @@ fn opened(path: &Path, kinds: &[Kind]) -> Result<(Folder, Manifest), Failure> {
 ///
 /// The failure that a command reports.
 pub fn dataset(path: &Path) -> Result<(Folder, Manifest), Failure> {
-    kind::expect(path, &[Kind::Dataset])?;
     let opened = opened(path, &[Kind::Dataset])?;
     note_rebuilt(path);
     Ok(opened)

@@ -6,20 +6,15 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 
 use super::{Failure, is_stdout, wrong};
+use crate::file;
 
-/// A format of answers.
-pub trait Format: ValueEnum + Copy + PartialEq + Send + Sync + 'static {
-    /// The formats with the endings of their files, those of a format together, the usual one first.
-    const ENDINGS: &'static [(&'static str, Self)];
-    /// Text for a terminal.
-    const TABLE: Self;
-    /// A binary format, which is not printed on a terminal.
-    const PARQUET: Self;
-}
+/// The endings of files and the names of their formats, those of a format together, the usual one first.
+const ENDINGS: [(&str, &str); 5] =
+    [("csv", "csv"), ("jsonl", "jsonl"), ("ndjson", "jsonl"), ("parquet", "parquet"), ("txt", "table")];
 
 /// Arguments for destination and format.
 #[derive(Debug, clap::Args)]
-pub struct Output<F: Format> {
+pub struct Output<F: ValueEnum + Send + Sync + 'static> {
     /// Output format [default: by the ending of the file, else table]
     #[arg(long)]
     format: Option<F>,
@@ -28,7 +23,7 @@ pub struct Output<F: Format> {
     pub out: PathBuf,
 }
 
-impl<F: Format> Output<F> {
+impl<F: ValueEnum + Copy + PartialEq + Send + Sync> Output<F> {
     /// Whether the answer goes to standard output.
     pub fn is_stdout(&self) -> bool {
         is_stdout(&self.out)
@@ -40,31 +35,31 @@ impl<F: Format> Output<F> {
     ///
     /// A file extension that determines no format, or Parquet on a terminal.
     pub fn format(&self) -> Result<F, Failure> {
-        let ending = self.out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        let known = ending.and_then(|ending| F::ENDINGS.iter().find(|(known, _)| *known == ending));
+        let [parquet, table] = ["parquet", "table"].map(|name| F::from_str(name, false).ok());
+        // The endings of the formats of this answer.
+        let endings = || ENDINGS.iter().filter_map(|(ending, name)| Some((*ending, F::from_str(name, false).ok()?)));
+        let ending = file::ending(&self.out);
+        let known = endings().find(|(known, _)| *known == ending);
         if let (Some(format), Some((ending, of_ending))) = (self.format, known)
-            && (format == F::PARQUET) != (*of_ending == F::PARQUET)
+            && (Some(format) == parquet) != (Some(of_ending) == parquet)
         {
             return Err(wrong(format!(
                 "--out {}: the ending .{ending} contradicts --format\n  help: leave out --format, or change the ending",
                 self.out.display()
             )));
         }
-        let format = match (self.format, known) {
-            (Some(format), _) | (None, Some(&(_, format))) => format,
-            (None, None) if self.is_stdout() => F::TABLE,
-            (None, None) => {
-                let name = self.out.display();
-                let mut usual = F::ENDINGS.to_vec();
-                usual.dedup_by_key(|(_, format)| *format);
-                let usual: Vec<String> = usual.iter().map(|(ending, _)| format!(".{ending}")).collect();
-                return Err(wrong(format!(
-                    "--out {name}: the ending is none of {}\n  help: add --format",
-                    usual.join(", ")
-                )));
-            }
+        let usual = table.filter(|_| self.is_stdout());
+        let Some(format) = self.format.or(known.map(|(_, format)| format)).or(usual) else {
+            let mut usual: Vec<(&str, F)> = endings().collect();
+            usual.dedup_by_key(|(_, format)| *format);
+            let usual: Vec<String> = usual.iter().map(|(ending, _)| format!(".{ending}")).collect();
+            return Err(wrong(format!(
+                "--out {}: the ending is none of {}\n  help: add --format",
+                self.out.display(),
+                usual.join(", ")
+            )));
         };
-        if format == F::PARQUET && self.is_stdout() && io::stdout().is_terminal() {
+        if Some(format) == parquet && self.is_stdout() && io::stdout().is_terminal() {
             return Err(wrong(
                 "Parquet is not written to a terminal\n  help: name a file with --out, or pipe the output",
             ));

@@ -56,7 +56,10 @@ pub struct Arguments {
 impl From<PlotError> for Failure {
     fn from(error: PlotError) -> Failure {
         // A damaged file is not an error of the arguments.
-        if matches!(error, PlotError::Part(_) | PlotError::Trace(_)) { Failure::failed(error) } else { wrong(error) }
+        match error {
+            PlotError::Part(_) | PlotError::Frame(_) | PlotError::Trace(_) => Failure::failed(error),
+            _ => wrong(error),
+        }
     }
 }
 

@@ -7,19 +7,16 @@ use std::env;
 use std::fs;
 use std::io::{self, BufWriter, IsTerminal, Read, Write};
 use std::mem;
-use std::panic::{self, AssertUnwindSafe};
+use std::panic;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::process::{ChildStdout, Command, ExitStatus, Stdio};
 use std::thread;
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use clap::ValueEnum;
 use indicatif::ProgressBar;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
-use super::output::{self, Output};
+use super::output::Output;
 use super::watch;
 use super::{
     Failure, cannot_write, keep_datasets, kind, note, note_rebuilt, say, stdout, summary, to_file, words, written,
@@ -59,23 +56,8 @@ enum Format {
     Parquet,
 }
 
-impl output::Format for Format {
-    const ENDINGS: &'static [(&'static str, Format)] = &[
-        ("csv", Format::Csv),
-        ("jsonl", Format::Jsonl),
-        ("ndjson", Format::Jsonl),
-        ("parquet", Format::Parquet),
-        ("txt", Format::Table),
-    ];
-    const TABLE: Format = Format::Table;
-    const PARQUET: Format = Format::Parquet;
-}
-
 /// Environment variable of the query process.
 const INSIDE: &str = "SLIPSWEEP_ANSWERS";
-
-/// Polling interval of the query process. Chosen: it delays a short query by at most this time.
-const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Stack for parsing and planning a query, in bytes. Chosen: a term takes some kilobytes, and a query has thousands at most.
 const STACK_BYTES: usize = 256 << 20;
@@ -106,46 +88,45 @@ pub fn query(arguments: &Arguments) -> Result<(), Failure> {
     apart(arguments)
 }
 
-/// Answers a query in a separate process: this program again, whose messages come through a pipe.
+/// Answers a query in a separate process: this program again, whose messages come through a pipe. It ends when its
+/// standard input closes.
 fn apart(arguments: &Arguments) -> Result<(), Failure> {
-    let signal = Arc::new(AtomicUsize::new(0));
-    for number in [SIGINT, SIGTERM] {
-        // A signal without a handler keeps its usual effect.
-        let _ = signal_hook::flag::register_usize(number, signal.clone(), number as usize);
-    }
     let no_process = |error| cannot_start("the query process", error);
     let program = env::current_exe().map_err(no_process)?;
     let mut command = Command::new(program);
     command.args(env::args_os().skip(1)).env(INSIDE, "1").stdin(Stdio::piped()).stderr(Stdio::piped());
     let bar = watch::spinner("answering the query");
     // On a terminal the answer goes through this process, which removes the progress line first.
-    let is_terminal = io::stdout().is_terminal();
-    if is_terminal {
+    if io::stdout().is_terminal() {
         command.stdout(Stdio::piped());
     }
     let mut child = command.spawn().map_err(no_process)?;
-    let (answer, mut said, line) = (child.stdout.take(), child.stderr.take(), bar.clone());
-    let pass = move || answer.map_or((), |answer| pass_on(answer, &line));
-    let listen = move || said.as_mut().and_then(|said| io::read_to_string(said).ok()).unwrap_or_default();
-    let threads =
-        thread::Builder::new().spawn(pass).and_then(|passer| Ok((passer, thread::Builder::new().spawn(listen)?)));
-    let (passer, listener) = threads.map_err(|error| {
-        let _ = child.kill();
-        let _ = child.wait();
-        no_process(error)
-    })?;
-    let ended = wait(&mut child, &signal, &bar);
+    let (mut open, answer) = (child.stdin.take(), child.stdout.take());
+    let look = |caught: Option<i32>| {
+        if caught.is_some() {
+            open = None;
+        }
+        if bar.elapsed() > watch::PROGRESS_DELAY && !bar.is_finished() {
+            bar.tick();
+        }
+    };
+    let work = || {
+        thread::scope(|scope| {
+            if let Some(answer) = answer {
+                thread::Builder::new().spawn_scoped(scope, || pass_on(answer, &bar))?;
+            }
+            child.wait_with_output()
+        })
+    };
+    let (ended, caught) = watch::while_looking(look, work);
     bar.finish_and_clear();
-    // A panic there leaves the answer incomplete, like a reader that has had enough.
-    let _ = passer.join();
-    let text = listener.join().unwrap_or_default();
-    let number = signal.load(Ordering::Relaxed);
-    if number != 0 {
+    if let Some(number) = caught {
         sweep(&arguments.output.out);
         let message = "stopped while answering the query; nothing has changed".to_owned();
         return Err(Failure { code: u8::try_from(128 + number).unwrap_or(u8::MAX), message });
     }
-    let status = ended.map_err(Failure::failed)?;
+    let ended = ended.map_err(no_process)?;
+    let (status, text) = (ended.status, String::from_utf8_lossy(&ended.stderr));
     match status.code() {
         Some(0) => {
             let _ = write!(io::stderr(), "{text}");
@@ -173,23 +154,6 @@ fn pass_on(mut answer: ChildStdout, bar: &ProgressBar) {
         if out.write_all(&bytes[..length]).and_then(|()| out.flush()).is_err() {
             break;
         }
-    }
-}
-
-/// Waits for the end of a process, or ends it after a signal.
-fn wait(child: &mut Child, signal: &AtomicUsize, bar: &ProgressBar) -> io::Result<ExitStatus> {
-    loop {
-        if let Some(status) = child.try_wait()? {
-            return Ok(status);
-        }
-        if signal.load(Ordering::Relaxed) != 0 {
-            child.kill()?;
-            return child.wait();
-        }
-        if bar.elapsed() > watch::PROGRESS_DELAY && !bar.is_finished() {
-            bar.tick();
-        }
-        thread::sleep(POLL_INTERVAL);
     }
 }
 
@@ -231,10 +195,9 @@ fn inside(arguments: &Arguments) -> Result<(), Failure> {
     };
     thread::Builder::new().spawn(watch).map_err(no_thread)?;
     thread::scope(|scope| {
-        let work = || panic::catch_unwind(AssertUnwindSafe(|| answer(arguments)));
+        let work = || answer(arguments);
         let thread = thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work).map_err(no_thread)?;
-        let done = thread.join().and_then(|done| done);
-        done.unwrap_or_else(|_| {
+        thread.join().unwrap_or_else(|_| {
             Err(Failure::failed("the query failed: it is not supported\n  help: rewrite the query"))
         })
     })

@@ -6,6 +6,7 @@ use super::summary::SummaryBlock;
 use super::watch::waiting;
 use super::{Failure, dataset, is_stdout, keep_datasets, plan, put, refused, say, summary, words, write_file};
 use crate::dataset::{Folder, TableSurvey};
+use crate::file::ending;
 use crate::plot::table::{Request, Source};
 use crate::plot::{COLUMN, PAGE, Page, PlotError};
 use crate::protocol::Status;
@@ -31,9 +32,9 @@ pub struct Arguments {
 pub fn report(arguments: &Arguments) -> Result<(), Failure> {
     let (folder, manifest) = dataset(&arguments.dataset)?;
     let path = arguments.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", manifest.name)));
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let is_page = matches!(ending(&path).as_str(), "html" | "htm");
     // A device or a named pipe has no ending.
-    if !is_stdout(&path) && !matches!(ending.as_deref(), Some("html" | "htm")) && (path.is_file() || !path.exists()) {
+    if !is_stdout(&path) && !is_page && (path.is_file() || !path.exists()) {
         let found = format!("--out {}: the page is HTML", path.display());
         return Err(refused(found, "a name that ends in .html", "leave out --out, or change the ending"));
     }
@@ -71,7 +72,7 @@ fn pictures(page: &mut Page, source: Source) -> Result<(), Failure> {
                 page.picture(&figure.draw(if figure.columns > 1 { PAGE } else { COLUMN }));
                 figure.remarks.iter().for_each(|remark| page.words(&format!("{table}: {remark} of `slipsweep plot`.")));
             }
-            Err(error @ PlotError::Part(_)) => return Err(error.into()),
+            Err(error @ (PlotError::Part(_) | PlotError::Frame(_))) => return Err(error.into()),
             // The help of the message concerns single pictures.
             Err(error) => page.words(error.to_string().lines().next().unwrap_or_default()),
         }

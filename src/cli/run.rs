@@ -151,7 +151,7 @@ fn report(
 const MAX_CELL_BYTES: f64 = 16.0;
 
 /// Greatest size of a part without its rows and the spec, in bytes. Chosen: five times that of `compliant`, the longest of all tables, whose part of one
-/// row has 12,207.
+/// row has 12 kB.
 const MAX_FOOTER_BYTES: f64 = 65536.0;
 
 /// Checks that the missing parts of `shards`, given for each table, fit on the disk.

@@ -8,7 +8,7 @@ use std::process::Command;
 use clap::ValueEnum;
 
 use super::watch::waiting;
-use super::{Failure, cannot_write, load, refused, say, to_file, whole, within, words, wrong};
+use super::{Failure, cannot_write, load, refused, say, whole, within, words, write_file, wrong};
 use crate::dataset::Folder;
 use crate::sweep::{Plan, Shard, check_parts, estimate};
 
@@ -49,17 +49,10 @@ pub enum Engine {
 const SHARDS: &str = "# shards: ";
 
 impl Engine {
-    fn name(self) -> &'static str {
-        match self {
-            Engine::Slurm => "slurm",
-            Engine::Hyperqueue => "hyperqueue",
-        }
-    }
-
     /// The job script of a dataset, in the folder of the dataset folder.
     fn script(self, dataset: &Path) -> PathBuf {
         let mut name = dataset.file_name().unwrap_or_default().to_owned();
-        name.push(format!(".{}.sh", self.name()));
+        name.push(format!(".{self:?}.sh").to_lowercase());
         dataset.with_file_name(name)
     }
 
@@ -127,7 +120,7 @@ pub fn shards(arguments: &Arguments) -> Result<(), Failure> {
     let paths = [program.as_path(), &spec, &out, folder.path()].map(quoted);
     let size = (shards, arguments.cpus, each);
     let text = script_of(engine, &sweep.name, &script.with_extension(""), size, paths);
-    to_file(&script, |file| file.write_all(text.as_bytes())).map_err(|error| cannot_write(&script, &error))?;
+    write_file(&script, text.as_bytes())?;
 
     let (rows, parts, work) = (words::things(rows, "row"), words::things(parts, "part"), words::duration(seconds));
     let (tasks, cpus) = (words::things(shards, "task"), words::things(arguments.cpus, "processor"));

@@ -112,7 +112,7 @@ pub fn blocks(name: &str, rows: u64, statistics: &TableStatistics) -> Vec<Summar
                 Some(counts) => counted(label, counts),
                 None => SummaryBlock::Line(2, format!("{label}: more than {MAX_KEPT_ROWS} different labels")),
             }));
-            let words = statistics.words.iter().filter(|(_, counts)| counts.iter().next().is_some());
+            let words = statistics.words.iter().filter(|(_, counts)| !counts.is_empty());
             blocks.extend(words.map(|(column, counts)| counted(column, counts)));
         }
     }
@@ -153,16 +153,18 @@ fn ranges(statistics: &TableStatistics) -> Option<SummaryBlock> {
 fn predicted(name: &str, statistics: &TableStatistics) -> Vec<SummaryBlock> {
     let prediction = table::find(name).and_then(|table| table.prediction());
     let Some(prediction) = prediction.filter(|_| !statistics.predicted.is_empty()) else { return Vec::new() };
-    let line =
-        |(predicted, found, rows): &(String, String, u64)| vec![predicted.clone(), found.clone(), words::count(*rows)];
+    let mut lines = Vec::new();
+    for (predicted, found) in &statistics.predicted {
+        lines.extend(found.iter().map(|(word, rows)| vec![predicted.clone(), word.clone(), words::count(*rows)]));
+    }
     let names = ["predicted", "found", "rows"].map(str::to_owned);
     let mut blocks = vec![
         SummaryBlock::Line(2, format!("{} as {} predicts it, and as found:", prediction.column, prediction.theory)),
-        SummaryBlock::Table(4, names.to_vec(), Vec::new(), statistics.predicted.iter().map(line).collect()),
+        SummaryBlock::Table(4, names.to_vec(), Vec::new(), lines),
     ];
     for (word, why) in prediction.surprises {
-        let differ = statistics.predicted.iter().filter(|(predicted, found, _)| found == word && predicted != word);
-        let differ: u64 = differ.map(|(.., rows)| rows).sum();
+        let others = statistics.predicted.iter().filter(|(predicted, _)| predicted.as_str() != *word);
+        let differ: u64 = others.filter_map(|(_, found)| found.get(*word)).sum();
         if differ > 0 {
             blocks.push(SummaryBlock::Line(4, format!("{} of {word}: {why}", words::things(differ, "row"))));
         }

@@ -35,9 +35,9 @@ pub fn watched<T>(signal: &Signal, tables: Vec<(u64, u64)>, quiet: bool, work: i
         }
         show.update(signal);
     };
-    let result = while_looking(look, work);
+    let ended = while_looking(look, work);
     show.bar.finish_and_clear();
-    (result, signals().caught())
+    ended
 }
 
 /// Runs `work`, which writes nothing, and shows what it is `doing` on a terminal after a second. Ctrl-C and SIGTERM end the process with a message
@@ -55,13 +55,13 @@ pub fn waiting<T>(doing: &str, work: impl FnOnce() -> T) -> T {
             line.tick();
         }
     };
-    let result = while_looking(look, work);
+    let (result, _) = while_looking(look, work);
     line.finish_and_clear();
     result
 }
 
-/// Runs `work` while another thread calls `look` at intervals, with the signal received, if any.
-fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce() -> T) -> T {
+/// Runs `work` while another thread calls `look` at intervals, with the signal received, if any. Returns the result of `work`, and that signal.
+pub fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce() -> T) -> (T, Option<i32>) {
     let signals = signals();
     signals.idle.store(false, Ordering::Release);
     let finished = AtomicBool::new(false);
@@ -79,7 +79,7 @@ fn while_looking<T>(mut look: impl FnMut(Option<i32>) + Send, work: impl FnOnce(
         signals.idle.store(true, Ordering::Release);
         finished.store(true, Ordering::Release);
         watcher.inspect(|watcher| watcher.thread().unpark());
-        result.unwrap_or_else(|panic| resume_unwind(panic))
+        (result.unwrap_or_else(|panic| resume_unwind(panic)), signals.caught())
     })
 }
 

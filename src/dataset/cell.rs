@@ -10,16 +10,15 @@ use serde::{Deserialize, Serialize};
 
 use super::layout::label;
 
-/// A cell. In JSON it is `null`, a number as text (which preserves every bit and infinity), or a list of one word.
+/// A cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
 pub enum Cell {
     /// Null.
     Missing,
     /// A number.
     Number(#[serde(with = "exact")] f64),
     /// A word.
-    Word(#[serde(with = "single")] String),
+    Word(String),
 }
 
 impl Cell {
@@ -115,7 +114,7 @@ pub fn first_row(batch: &RecordBatch) -> Vec<Cell> {
     batch.columns().iter().map(|array| first(array).unwrap_or(Cell::Missing)).collect()
 }
 
-/// A number as text: the shortest text that determines the double.
+/// A number as text in JSON: the shortest text that determines the double, which preserves infinity, too.
 pub mod exact {
     use super::{Cow, Deserialize};
     use serde::{Deserializer, Serializer, de::Error};
@@ -128,19 +127,5 @@ pub mod exact {
     /// Deserialises a number.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         Cow::<str>::deserialize(deserializer)?.parse().map_err(D::Error::custom)
-    }
-}
-
-/// A word as a list of one, which distinguishes it from a number.
-mod single {
-    use super::Deserialize;
-    use serde::{Deserializer, Serialize, Serializer};
-
-    pub fn serialize<S: Serializer>(word: &str, serializer: S) -> Result<S::Ok, S::Error> {
-        [word].serialize(serializer)
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
-        <[String; 1]>::deserialize(deserializer).map(|[word]| word)
     }
 }

@@ -10,10 +10,13 @@ use rayon::prelude::*;
 use super::atomic;
 use super::manifest::{Manifest, ManifestTable};
 use super::state::{self, CheckDepth, Foreign, State};
-use crate::file;
+use crate::file::{self, sorted};
 
 /// The name of the file of the manifest.
 pub const MANIFEST: &str = "manifest.json";
+
+/// Why a manifest without a file comes from the parts.
+pub(super) const MISSING: &str = "missing";
 
 /// The help if the folder contains another dataset.
 const OTHER_SPEC_HELP: &str = "change `name` in the spec, or write elsewhere with --out DIR, or remove the dataset";
@@ -129,7 +132,7 @@ impl Folder {
     pub fn manifest(&self) -> Result<Option<Manifest>, DatasetError> {
         let read = self.read_manifest();
         let why = match &read {
-            Ok(None) => "missing".to_owned(),
+            Ok(None) => MISSING.to_owned(),
             Err(DatasetError::Manifest { why, .. }) => format!("damaged: {why}"),
             _ => return read,
         };
@@ -152,7 +155,7 @@ impl Folder {
     }
 
     /// The manifest reconstructed from the parts, if any part can be read.
-    pub(super) fn manifest_of_parts(&self) -> Option<Manifest> {
+    fn manifest_of_parts(&self) -> Option<Manifest> {
         let first = |table: PathBuf| sorted(&table, is_part).into_iter().find_map(|part| state::footer_of(&part));
         let footers = sorted(&self.path, Path::is_dir).into_iter().filter_map(first);
         // Tables are only added, so the manifest with the most tables is the last one.
@@ -167,9 +170,14 @@ impl Folder {
     /// Checks that a run of `expected` may write to the dataset of `found`.
     pub(super) fn compare(&self, expected: &Manifest, found: &Manifest) -> Result<(), DatasetError> {
         let folder = self.path.display().to_string();
-        if let Some((what, here, there)) = expected.build.difference(&found.build) {
-            let expected = format!("{here}, of this program");
-            return Err(DatasetError::Foreign { folder, what, expected, found: there.to_owned() });
+        let (ours, theirs) = (&expected.build, &found.build);
+        for (what, here, there) in
+            [("version", &ours.version, &theirs.version), ("numerics revision", &ours.revision, &theirs.revision)]
+        {
+            if here != there {
+                let expected = format!("{here}, of this program");
+                return Err(DatasetError::Foreign { folder, what, expected, found: there.clone() });
+            }
         }
         for table in &expected.tables {
             if let Some(other) = found.table(&table.name)
@@ -200,11 +208,6 @@ impl Folder {
         let mut parts: Vec<u64> = entries.filter_map(|entry| self.part_at(table, &entry.path())).collect();
         parts.sort_unstable();
         parts
-    }
-
-    /// The state of a part in the dataset of `manifest`.
-    pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
-        state::state(&self.part(table, part), manifest, table, part, look)
     }
 
     /// The paths of the present parts of `table` in order, and the number of missing parts. The footer of each part is verified here, its pages when they are read.
@@ -270,14 +273,6 @@ impl Folder {
         let part = name(path).strip_prefix("part-")?.strip_suffix(".parquet")?.parse().ok()?;
         (part < table.parts && self.part(&table.name, part) == path).then_some(part)
     }
-}
-
-/// The `wanted` entries of a folder, by name; empty if it cannot be read.
-fn sorted(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| wanted(path)).collect();
-    paths.sort();
-    paths
 }
 
 /// The name of a file.

@@ -1,6 +1,5 @@
 //! The footer of a part: key-value metadata.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use parquet::file::metadata::KeyValue;
@@ -37,7 +36,6 @@ const TABLE: &str = "slipsweep.table";
 const HASH: &str = "slipsweep.hash";
 const ROW_START: &str = "slipsweep.row_start";
 const ROW_END: &str = "slipsweep.row_end";
-const STATUS: &str = "slipsweep.status";
 const STATISTICS: &str = "slipsweep.statistics";
 
 /// Rows by status, in the order of [`Status::ALL`].
@@ -51,8 +49,6 @@ impl Footer {
 
     /// The footer as Parquet metadata, with the statistics of the rows. The entries of the checksums follow.
     pub fn entries(&self, statistics: &TableStatistics) -> Vec<KeyValue> {
-        let counts: BTreeMap<&str, u64> = Status::ALL.map(Status::name).into_iter().zip(statistics.status).collect();
-        let counts = serde_json::to_string(&counts).unwrap_or_default();
         let Manifest { name, build, tables, spec, .. } = &self.manifest;
         let tables = serde_json::to_string(tables).unwrap_or_default();
         let entries = [
@@ -64,7 +60,6 @@ impl Footer {
             (HASH, self.planned().map_or_else(String::new, |table| table.hash.clone())),
             (ROW_START, self.rows.start.to_string()),
             (ROW_END, self.rows.end.to_string()),
-            (STATUS, counts),
             (STATISTICS, serde_json::to_string(statistics).unwrap_or_default()),
         ];
         let spec = (spec.len() <= MAX_SPEC_BYTES).then(|| (SPEC, spec.clone()));
@@ -87,12 +82,8 @@ impl Footer {
 
     /// The statistics of the rows of the part, from its Parquet metadata.
     pub fn statistics(entries: &[KeyValue]) -> Option<TableStatistics> {
-        let get = |key: &str| entries.iter().find(|entry| entry.key == key)?.value.as_deref();
-        let counts: BTreeMap<String, u64> = serde_json::from_str(get(STATUS)?).ok()?;
-        let status = Status::ALL.map(|status| counts.get(status.name()).copied().unwrap_or(0));
-        let mut statistics: TableStatistics = serde_json::from_str(get(STATISTICS)?).ok()?;
-        statistics.status = status;
-        Some(statistics)
+        let entry = entries.iter().find(|entry| entry.key == STATISTICS)?;
+        serde_json::from_str(entry.value.as_deref()?).ok()
     }
 
     /// Its table in the manifest of the dataset.

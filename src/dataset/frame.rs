@@ -14,22 +14,19 @@ use parquet::schema::types::SchemaDescriptor;
 pub use super::cell::Cells;
 
 use super::cell::Cell;
-use super::folder::DatasetError;
 use super::guard::{coded, sound};
 use crate::file;
 
 /// Rows decoded in one batch. Chosen: a batch fits the cache of a core.
 const ROWS_AT_ONCE: usize = 1 << 14;
 
-/// Name, unit and meaning of a column of a file.
+/// Name and unit of a column of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Heading {
     /// Its name.
     pub name: String,
     /// Its unit; empty for words and flags.
     pub unit: String,
-    /// Its meaning.
-    pub doc: String,
     /// Whether it contains numbers; otherwise words, or flags as `true` and `false`.
     pub is_number: bool,
 }
@@ -67,17 +64,6 @@ pub struct FrameError {
     pub reason: String,
 }
 
-/// The error of reading a part.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    /// A part is damaged, or belongs to another dataset.
-    #[error(transparent)]
-    Part(#[from] DatasetError),
-    /// A part is found to be damaged during reading.
-    #[error("{0}\n  help: run the sweep again; it recomputes damaged parts alone")]
-    Frame(#[from] FrameError),
-}
-
 fn wrong(path: &Path, reason: impl std::fmt::Display) -> FrameError {
     FrameError { path: path.display().to_string(), reason: reason.to_string() }
 }
@@ -99,9 +85,9 @@ pub fn headings(path: &Path) -> Result<(Vec<Heading>, Facts), FrameError> {
     };
     let (schema, entries) = sound(read).map_err(|error| wrong(path, error))?;
     let heading = |field: &arrow_schema::FieldRef| {
-        let entry = |key: &str| field.metadata().get(key).cloned().unwrap_or_default();
+        let unit = field.metadata().get("unit").cloned().unwrap_or_default();
         let is_number = field.data_type().is_numeric();
-        Heading { name: field.name().clone(), unit: entry("unit"), doc: entry("description"), is_number }
+        Heading { name: field.name().clone(), unit, is_number }
     };
     let entries = entries.into_iter().filter_map(|entry| Some((entry.key, entry.value?))).collect();
     Ok((schema.fields().iter().map(heading).collect(), entries))
@@ -157,14 +143,6 @@ fn range(group: &RowGroupMetaData, name: &str) -> Option<(f64, f64)> {
 pub fn row(path: &Path, row: usize) -> Result<Row, FrameError> {
     let frame = open(path, None, |all| all.with_offset(row).with_limit(1))?;
     if frame.height == 1 { Ok(frame.row(0)) } else { Err(wrong(path, format!("it has no row {row}"))) }
-}
-
-/// All columns of the first `count` rows of a Parquet file.
-///
-/// # Errors
-/// If the file cannot be read.
-pub fn first(path: &Path, count: usize) -> Result<Frame, FrameError> {
-    open(path, None, |all| all.with_limit(count))
 }
 
 /// The columns `names` of a file. `ProjectionMask::columns` takes a dot in a name as the name of a field of a group.

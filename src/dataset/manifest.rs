@@ -21,14 +21,6 @@ impl Build {
     pub fn this() -> Build {
         Build { version: env!("CARGO_PKG_VERSION").to_owned(), revision: env!("SLIPSWEEP_REVISION").to_owned() }
     }
-
-    /// The first property in which another build differs: its name, and both values.
-    pub(super) fn difference<'a>(&'a self, other: &'a Build) -> Option<(&'static str, &'a str, &'a str)> {
-        let properties =
-            [("version", &self.version, &other.version), ("numerics revision", &self.revision, &other.revision)];
-        let differing = properties.into_iter().find(|(_, own, other)| own != other);
-        differing.map(|(what, own, other)| (what, own.as_str(), other.as_str()))
-    }
 }
 
 /// One table of a dataset.

@@ -6,7 +6,6 @@ mod cell;
 mod checksum;
 mod chunk;
 mod dictionary;
-mod flags;
 mod folder;
 mod footer;
 #[cfg(feature = "read")]
@@ -30,7 +29,7 @@ pub(crate) use cell::first_row;
 pub use folder::{DatasetError, Folder, MANIFEST};
 pub use footer::{Footer, StatusCounts};
 #[cfg(feature = "read")]
-pub use frame::{FrameError, ReadError, Row};
+pub use frame::{FrameError, Row};
 #[cfg(feature = "cli")]
 pub(crate) use guard::is_guarded;
 #[cfg(feature = "query")]

@@ -1,4 +1,5 @@
-//! Column chunks of mostly distinct numbers: byte stream split, that is, the first bytes of all numbers, then the second bytes, …
+//! Column chunks of flags, one bit each, and of mostly distinct numbers: byte stream split, that is, the first bytes of all numbers, then the
+//! second bytes, …
 //!
 //! Format: <https://parquet.apache.org/docs/file-format/data-pages/encodings/#BYTESTREAMSPLIT>. In a smooth column, the last two streams (sign,
 //! exponent and leading mantissa bits) compress well.
@@ -40,11 +41,24 @@ pub fn chunk(cells: &[f64]) -> Chunk {
     }
 }
 
-/// Distinct consecutive numbers, and runs of their indices.
-type Repeated = (Vec<f64>, Vec<(usize, usize)>);
+/// The chunk of flags, which are 1, 0, or NaN for a missing value, in Parquet's plain encoding.
+pub fn flags(cells: &[f64]) -> Chunk {
+    let flags: Vec<bool> = cells.iter().filter(|cell| !cell.is_nan()).map(|&cell| cell != 0.0).collect();
+    let mut data = page(Some(&presence(cells)));
+    data.extend(flags.chunks(8).map(|eight| eight.iter().rev().fold(0, |byte, &flag| byte << 1 | u8::from(flag))));
+    let (least, greatest) = (flags.iter().min().copied(), flags.iter().max().copied());
+    let nulls = (cells.len() - flags.len()) as u64;
+    Chunk {
+        rows: cells.len(),
+        dictionary: None,
+        data,
+        encoding: Encoding::PLAIN,
+        statistics: Statistics::boolean(least, greatest, None, Some(nulls), false),
+    }
+}
 
-/// Numbers with long runs, such as the optimal work along a landscape; `None` for a column without them.
-fn repeating(values: &[f64]) -> Option<Repeated> {
+/// Distinct consecutive numbers and runs of their indices, such as the optimal work along a landscape; `None` for a column without long runs.
+fn repeating(values: &[f64]) -> Option<(Vec<f64>, Vec<(usize, usize)>)> {
     let most = values.len().div_ceil(16);
     let runs = values.chunk_by(|one, next| one.to_bits() == next.to_bits());
     let (distinct, lengths): (Vec<f64>, Vec<usize>) = runs.map(|run| (run[0], run.len())).take(most + 1).unzip();

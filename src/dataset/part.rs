@@ -15,7 +15,7 @@ use super::chunk::{Chunk, Runs};
 use super::footer::Footer;
 use super::layout::Layout;
 use super::statistics::TableStatistics;
-use super::{checksum, dictionary, flags, numbers};
+use super::{checksum, dictionary, numbers};
 use crate::grid::{RowIndex, View};
 use crate::protocol::Status;
 use crate::table::{ColumnBuffer, Kind};
@@ -94,7 +94,7 @@ fn chunks<'a>(
         match column.kind {
             Kind::Number(_) | Kind::Quantity(_) => numbers::chunk(cells),
             Kind::Label(words) => words_of(words, cells),
-            Kind::Flag => flags::chunk(cells),
+            Kind::Flag => numbers::flags(cells),
         }
     });
     let status = iter::once_with(move || status_of(&buffer.status[rows.clone()]));

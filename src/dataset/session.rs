@@ -8,11 +8,8 @@ use std::thread;
 use std::time::{Duration, SystemTime};
 
 use super::atomic;
-use super::folder::{DatasetError, Folder};
+use super::folder::{DatasetError, Folder, MISSING};
 use super::manifest::Manifest;
-
-/// Attempts to publish a manifest while another one appears and disappears. Chosen: each attempt fails only if another process does both in between.
-const ATTEMPTS: usize = 4;
 
 /// A run that writes to a dataset.
 #[derive(Debug)]
@@ -20,8 +17,6 @@ pub struct Session {
     folder: Folder,
     /// The current manifest.
     pub manifest: Manifest,
-    /// The tables of this run.
-    planned: Manifest,
     _lock: Option<Lock>,
 }
 
@@ -52,42 +47,36 @@ impl Folder {
             atomic::create_folder(&folder)?;
             atomic::sweep(&folder, now);
         }
-        let session = Session { folder: self.clone(), manifest, planned: planned.clone(), _lock: lock };
+        let session = Session { folder: self.clone(), manifest, _lock: lock };
         session.check()?;
         Ok(session)
     }
 
     /// The manifest that the folder needs for `planned`, and the required action.
     fn settle(&self, planned: &Manifest) -> Result<(Manifest, ManifestAction), DatasetError> {
-        let (found, mut action) = match self.read_manifest() {
-            Ok(Some(found)) => (Some(found), ManifestAction::Keep),
-            Ok(None) => {
-                let is_visible = |entry: fs::DirEntry| !entry.file_name().to_string_lossy().starts_with('.');
-                let occupied = fs::read_dir(self.path()).is_ok_and(|entries| entries.flatten().any(is_visible));
-                // Another run may just have published its manifest, which is its first file.
-                match (self.read_manifest()?, self.manifest_of_parts()) {
-                    (None, None) if occupied => {
-                        return Err(DatasetError::Occupied { folder: self.path().display().to_string() });
-                    }
-                    (None, rebuilt) => (rebuilt, ManifestAction::Create),
-                    (found, _) => (found, ManifestAction::Keep),
-                }
+        let found = match self.manifest() {
+            // Nothing is lost with it.
+            Err(DatasetError::Manifest { .. }) if !self.has_parts() => {
+                return Ok((planned.clone(), ManifestAction::Replace));
             }
-            Err(error @ DatasetError::Manifest { .. }) => match self.manifest_of_parts() {
-                // The origin of the parts is unknown.
-                None if self.has_parts() => return Err(error),
-                found => (found, ManifestAction::Replace),
-            },
-            Err(error) => return Err(error),
+            found => found?,
         };
-        let Some(found) = found else { return Ok((planned.clone(), action)) };
+        let Some(found) = found else {
+            let is_visible = |entry: fs::DirEntry| !entry.file_name().to_string_lossy().starts_with('.');
+            let occupied = fs::read_dir(self.path()).is_ok_and(|entries| entries.flatten().any(is_visible));
+            return match self.read_manifest()? {
+                // Another run has just published its manifest, which is its first file.
+                Some(_) => self.settle(planned),
+                None if occupied => Err(DatasetError::Occupied { folder: self.path().display().to_string() }),
+                None => Ok((planned.clone(), ManifestAction::Create)),
+            };
+        };
         self.compare(planned, &found)?;
-        if action == ManifestAction::Keep {
-            if found.covers(planned) {
-                return Ok((found, action));
-            }
-            action = ManifestAction::Replace;
-        }
+        let action = match found.rebuilt.as_deref() {
+            None if found.covers(planned) => return Ok((found, ManifestAction::Keep)),
+            Some(MISSING) => ManifestAction::Create,
+            _ => ManifestAction::Replace,
+        };
         let mut settled = if found.tables.len() > planned.tables.len() { found } else { planned.clone() };
         settled.rebuilt = None;
         if settled.spec.is_empty() {
@@ -99,19 +88,14 @@ impl Folder {
     /// Publishes the manifest for `planned`, and returns it.
     fn publish(&self, planned: &Manifest) -> Result<Manifest, DatasetError> {
         let path = self.manifest_path();
-        for _ in 0..ATTEMPTS {
-            let (manifest, action) = self.settle(planned)?;
-            // A run that creates a manifest may find that another run was faster.
-            let is_published = match action {
-                ManifestAction::Keep => true,
-                ManifestAction::Create => atomic::write_new(&path, &manifest.to_bytes())?,
-                ManifestAction::Replace => atomic::write(&path, &manifest.to_bytes()).map(|()| true)?,
-            };
-            if is_published {
-                return Ok(manifest);
-            }
-        }
-        Err(self.taken("manifest.json appeared and disappeared"))
+        let (manifest, action) = self.settle(planned)?;
+        let is_published = match action {
+            ManifestAction::Keep => true,
+            ManifestAction::Create => atomic::write_new(&path, &manifest.to_bytes())?,
+            ManifestAction::Replace => atomic::write(&path, &manifest.to_bytes()).map(|()| true)?,
+        };
+        // Another run may have created one first.
+        if is_published { Ok(manifest) } else { self.publish(planned) }
     }
 
     fn taken(&self, what: &'static str) -> DatasetError {
@@ -148,7 +132,7 @@ impl Session {
     /// If it has been removed or replaced.
     pub fn check(&self) -> Result<(), DatasetError> {
         match self.folder.read_manifest() {
-            Ok(Some(found)) if found.covers(&self.planned) => Ok(()),
+            Ok(Some(found)) if found.covers(&self.manifest) => Ok(()),
             Ok(None) => Err(self.folder.taken("manifest.json was removed")),
             _ => Err(self.folder.taken("manifest.json was replaced by another one")),
         }

@@ -8,6 +8,7 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::reader::ChunkReader;
 
 use super::checksum;
+use super::folder::Folder;
 use super::footer::{Footer, PREFIX};
 use super::guard::sound;
 use super::manifest::Manifest;
@@ -64,16 +65,19 @@ impl Foreign {
     }
 }
 
-/// The state of part number `part` of `table` in the dataset of `manifest`, whose file is `path`.
-pub fn state(path: &Path, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
-    let found = match look {
-        CheckDepth::Footer => sealed_entries(path),
-        CheckDepth::Whole => whole(path),
-    };
-    match found.and_then(|entries| entries.map(|entries| belongs(&entries, manifest, table, part)).transpose()) {
-        Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
-        Ok(None) => State::Missing,
-        Err(state) => state,
+impl Folder {
+    /// The state of a part in the dataset of `manifest`.
+    pub fn state(&self, manifest: &Manifest, table: &str, part: u64, look: CheckDepth) -> State {
+        let path = &self.part(table, part);
+        let found = match look {
+            CheckDepth::Footer => sealed_entries(path),
+            CheckDepth::Whole => whole(path),
+        };
+        match found.and_then(|entries| entries.map(|entries| belongs(&entries, manifest, table, part)).transpose()) {
+            Ok(Some(statistics)) => State::There { statistics: Box::new(statistics) },
+            Ok(None) => State::Missing,
+            Err(state) => state,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! The statistics of a part are computed when it is encoded, and stored in its footer. Merged in any order, they give the statistics of the
 //! table, so that a summary reads no rows.
 
+use std::collections::BTreeMap;
 use std::ops;
 
 use arrow_schema::ArrowError;
@@ -14,7 +15,7 @@ use super::cell::{Cell, exact, first_row};
 use super::footer::StatusCounts;
 use super::layout::Layout;
 use super::numbers;
-use crate::grid::{Point, Quantity, RowIndex, Scale, View};
+use crate::grid::{Quantity, RowIndex, Scale, View};
 use crate::protocol::Status;
 use crate::protocol::shortcut::FAMILIES;
 use crate::table::{ColumnBuffer, Kind, OPTIMUM_AXES};
@@ -28,8 +29,7 @@ const GAP: &str = "gap";
 /// The statistics of some rows of a table.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableStatistics {
-    /// Rows by status, in the order of [`Status::ALL`]. A footer has a separate entry for them.
-    #[serde(skip)]
+    /// Rows by status, in the order of [`Status::ALL`].
     pub status: StatusCounts,
     /// All columns of the table: name and unit, empty for words.
     pub columns: Vec<(String, String)>,
@@ -38,18 +38,17 @@ pub struct TableStatistics {
     /// The columns of words after the axes: each word and its number of rows.
     pub words: Vec<(String, Counts)>,
     /// The labels: each word and its number of rows; `None` for more than [`MAX_KEPT_ROWS`] words.
-    #[serde(default)]
     pub labels: Vec<(String, Option<Counts>)>,
-    /// Counts of predicted and found words, for a column with a prediction.
-    pub predicted: Vec<(String, String, u64)>,
+    /// For a column with a prediction, the words found for each predicted word.
+    pub predicted: BTreeMap<String, Counts>,
     /// All rows in their order, if the table has few.
     pub rows: Option<Vec<Row>>,
     /// The rows of least gap.
     least: LeastGaps,
 }
 
-/// Words and their numbers of rows, in the order of words.
-pub type Counts = Vec<(String, u64)>;
+/// Words and their numbers of rows.
+pub type Counts = BTreeMap<String, u64>;
 
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -148,16 +147,16 @@ impl TableStatistics {
             range.greatest = range.greatest.max(other.greatest);
         }
         for ((_, counts), (_, others)) in self.words.iter_mut().zip(other.words) {
-            others.into_iter().for_each(|(word, rows)| add(counts, &word, rows));
+            add(counts, others);
         }
         for ((_, counts), (_, others)) in self.labels.iter_mut().zip(other.labels) {
             *counts = counts.take().zip(others).and_then(|(mut counts, others)| {
-                others.into_iter().for_each(|(word, rows)| add(&mut counts, &word, rows));
+                add(&mut counts, others);
                 (counts.len() <= MAX_KEPT_ROWS).then_some(counts)
             });
         }
-        for (predicted, found, rows) in other.predicted {
-            count(&mut self.predicted, &predicted, &found, rows);
+        for (predicted, found) in other.predicted {
+            add(self.predicted.entry(predicted).or_default(), found);
         }
         if let (Some(rows), Some(others)) = (&mut self.rows, other.rows) {
             rows.extend(others);
@@ -195,24 +194,21 @@ impl Range {
     }
 }
 
-/// Adds the rows of a word.
-fn add(counts: &mut Counts, word: &str, rows: u64) {
-    match counts.binary_search_by(|(known, _)| known.as_str().cmp(word)) {
-        Ok(place) => counts[place].1 += rows,
-        Err(place) => counts.insert(place, (word.to_owned(), rows)),
-    }
+/// Adds the rows of other words.
+fn add(counts: &mut Counts, others: Counts) {
+    others.into_iter().for_each(|(word, rows)| *counts.entry(word).or_default() += rows);
 }
 
 /// The words of a label in these runs and their numbers of rows; `None` if there are more than [`MAX_KEPT_ROWS`].
 fn labelled(runs: &[(Option<&str>, usize)]) -> Option<Counts> {
-    let mut counts = Counts::new();
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for (word, rows) in runs.iter().filter_map(|(word, rows)| Some(((*word)?, *rows))) {
-        add(&mut counts, word, rows as u64);
+        *counts.entry(word).or_default() += rows as u64;
         if counts.len() > MAX_KEPT_ROWS {
             return None;
         }
     }
-    Some(counts)
+    Some(counts.into_iter().map(|(word, rows)| (word.to_owned(), rows)).collect())
 }
 
 /// The counts of words among `cells`, which are indices into `words`.
@@ -224,17 +220,7 @@ fn counts(words: &[&str], cells: &[f64]) -> Counts {
         }
     }
     let words = words.iter().map(|word| (*word).to_owned());
-    let mut counts: Counts = words.zip(counts).filter(|(_, count)| *count > 0).collect();
-    counts.sort();
-    counts
-}
-
-/// Adds `rows` rows with the prediction `predicted` and the result `found`.
-fn count(counts: &mut Vec<(String, String, u64)>, predicted: &str, found: &str, rows: u64) {
-    match counts.binary_search_by(|(p, f, _)| (p.as_str(), f.as_str()).cmp(&(predicted, found))) {
-        Ok(place) => counts[place].2 += rows,
-        Err(place) => counts.insert(place, (predicted.to_owned(), found.to_owned(), rows)),
-    }
+    words.zip(counts).filter(|(_, count)| *count > 0).collect()
 }
 
 fn predicted(
@@ -242,25 +228,19 @@ fn predicted(
     view: &View<'_>,
     rows: &ops::Range<u64>,
     buffer: &ColumnBuffer,
-) -> Vec<(String, String, u64)> {
-    let mut counted = Vec::new();
+) -> BTreeMap<String, Counts> {
+    let mut counted: BTreeMap<String, Counts> = BTreeMap::new();
     let Some(prediction) = &layout.prediction else { return counted };
     let column = layout.columns.iter().zip(&buffer.columns).find(|(column, _)| column.name == prediction.column);
     let Some((Kind::Label(words), cells)) = column.map(|(column, cells)| (column.kind, cells)) else { return counted };
-    let mut axes: Vec<(Quantity, Vec<f64>)> = Vec::new();
-    for axis in prediction.axes {
-        let Some(runs) = view.runs(*axis, rows.clone()) else { continue };
-        let unit = axis.unit(Scale::Model);
-        axes.push((*axis, runs.map(|value| layout.units.scaled(unit, value)).cells(rows.clone())));
-    }
-    let mut point = Point::default();
-    for (place, cell) in cells.iter().enumerate() {
-        let found = if cell.is_nan() { None } else { words.get(*cell as usize) };
-        let Some(found) = found else { continue };
-        for (axis, values) in &axes {
-            point[*axis] = values.get(place).copied().unwrap_or(f64::NAN);
+    for (row, cell) in rows.clone().zip(cells).filter(|(_, cell)| !cell.is_nan()) {
+        let Some(found) = words.get(*cell as usize) else { continue };
+        let mut point = view.point(row);
+        for axis in prediction.axes {
+            point[*axis] = layout.units.scaled(axis.unit(Scale::Model), point[*axis]);
         }
-        count(&mut counted, (prediction.word)(&point), found, 1);
+        let of_predicted = counted.entry((prediction.word)(&point).to_owned()).or_default();
+        *of_predicted.entry((*found).to_owned()).or_default() += 1;
     }
     counted
 }

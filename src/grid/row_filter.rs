@@ -63,11 +63,6 @@ impl RowFilter {
         Some(RowFilter { levels, combinations, kept: RoaringBitmap::from_lsb0_bytes(0, &bytes) })
     }
 
-    /// Whether it keeps every row.
-    pub fn keeps_all(&self) -> bool {
-        self.kept.len() == self.combinations
-    }
-
     /// The number of kept rows.
     pub fn rows(&self) -> u64 {
         self.kept.len() * self.levels.iter().map(|level| level.free).product::<u64>()
@@ -196,7 +191,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
         batches(rows).find_map(|rows| {
             sampler.load(rows.clone(), scratch);
             let kept = block.condition.as_ref().map(|condition| condition.evaluate(scratch).to_vec());
-            let values = scratch.column(quantity);
+            let values = &scratch.quantities[quantity as usize];
             let is_found = |&i: &usize| kept.as_ref().is_none_or(|kept| kept[i] != 0.0) && wrong(values[i]);
             (0..values.len()).find(is_found).map(|place| rows.start + place as u64)
         })
@@ -205,6 +200,7 @@ pub fn first_wrong(block: &Block, quantity: Quantity, wrong: impl Fn(f64) -> boo
     Some(found.map(|row| {
         let mut scratch = Scratch::default();
         sampler.pick(&[row], &mut scratch);
-        (scratch.column(quantity)[0], roots.iter().map(|root| (*root, scratch.column(*root)[0])).collect())
+        let value = |quantity: Quantity| scratch.quantities[quantity as usize][0];
+        (value(quantity), roots.iter().map(|root| (*root, value(*root))).collect())
     }))
 }

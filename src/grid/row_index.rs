@@ -70,7 +70,7 @@ impl Grid {
                 }
                 None => None,
             };
-            let row_filter = row_filter.filter(|row_filter| !row_filter.keeps_all()).map(Arc::new);
+            let row_filter = row_filter.map(Arc::new);
             let kept = row_filter.as_ref().map_or(digits.rows, |row_filter| row_filter.rows());
             blocks.push(BlockRows { block: block.clone(), digits, row_filter, first: rows, rows: kept });
             rows += kept;

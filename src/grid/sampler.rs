@@ -40,8 +40,8 @@ impl Source<'_> {
     /// The column that it fills.
     fn column<'s>(&self, scratch: &'s mut Scratch) -> &'s mut Vec<f64> {
         match &self.content {
-            Content::Axis(axis, _) => scratch.column_mut(axis.quantity),
-            Content::Label(number, _) => scratch.label_mut(*number),
+            Content::Axis(axis, _) => &mut scratch.quantities[axis.quantity as usize],
+            Content::Label(number, _) => scratch.labels.entry(*number).or_default(),
         }
     }
 }
@@ -75,9 +75,9 @@ impl<'a> Sampler<'a> {
         Sampler { sources, derived }
     }
 
-    /// The length of runs with constant quantities, in rows, from a multiple of this number; `None` if they never change.
-    pub fn run(&self) -> Option<u64> {
-        self.sources.iter().map(|source| source.digit.stride).min()
+    /// The length of runs with constant quantities, in rows, from a multiple of this number.
+    pub fn run(&self) -> u64 {
+        self.sources.iter().map(|source| source.digit.stride).min().unwrap_or(u64::MAX)
     }
 
     /// Evaluates consecutive rows.
@@ -114,7 +114,7 @@ impl<'a> Sampler<'a> {
     fn derive(&self, scratch: &mut Scratch) {
         for one in &self.derived {
             let values = one.expression.evaluate(scratch).to_vec();
-            *scratch.column_mut(one.quantity) = values;
+            scratch.quantities[one.quantity as usize] = values;
         }
     }
 }

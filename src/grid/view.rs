@@ -6,7 +6,7 @@ use super::block::Digit;
 use super::expression::Scratch;
 use super::quantity::{Point, Quantity};
 use super::row_index::{RowIndex, Tuples};
-use super::sampler::{BATCH_POINTS, Sampler};
+use super::sampler::Sampler;
 
 /// Rows of a table that are contiguous in the product of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,21 +55,9 @@ impl<'a> View<'a> {
     /// The values at `row`, one of the rows.
     pub fn point(&self, row: u64) -> Point {
         let mut point = Point::default();
-        if let Some(segment) = self.segments(row..row + 1).next() {
-            let block_rows = &self.row_index.blocks()[segment.block];
-            let block = &block_rows.block;
-            for digit in &block_rows.digits.digits {
-                for axis in &block.factors[digit.factor].axes {
-                    point[axis.quantity] = axis.values.at(digit.step(segment.raw.start));
-                }
-            }
-            let made = block.derived.iter().map(|derived| derived.quantity);
-            let made: Vec<Quantity> = made.filter(|quantity| block_rows.determines(*quantity)).collect();
-            let mut scratch = Scratch::default();
-            Sampler::new(block, &block_rows.digits, &made, None).pick(&[segment.raw.start], &mut scratch);
-            for quantity in made {
-                point[quantity] = scratch.column(quantity)[0];
-            }
+        for quantity in Quantity::ALL {
+            let value = self.runs(quantity, row..row + 1).and_then(|runs| runs.values().first().copied());
+            point[quantity] = value.unwrap_or(f64::NAN);
         }
         point
     }
@@ -89,38 +77,28 @@ impl<'a> View<'a> {
             let values = (first..first + steps).map(|turn| axis.values.at(turn % digit.len)).collect();
             return Some(Runs { values, order: Order::Cyclic { digit, segment: segment.clone() } });
         }
-        let (mut values, mut starts) = (Vec::<f64>::new(), Vec::new());
-        let (mut scratch, mut rows) = (Scratch::default(), Vec::new());
-        // Adds the values at `rows` of the table, each with its row of the product; computed ones only where they differ.
-        let mut take = |sampler: &Sampler<'_>, rows: &mut Vec<(u64, u64)>, is_computed: bool| {
-            sampler.pick(&rows.iter().map(|(_, raw)| *raw).collect::<Vec<u64>>(), &mut scratch);
-            for ((row, _), &value) in rows.drain(..).zip(scratch.column(quantity)) {
-                if !is_computed || values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
+        let (mut values, mut starts, mut scratch) = (Vec::<f64>::new(), Vec::new(), Scratch::default());
+        for group in segments.chunk_by(|one, next| one.block == next.block) {
+            let block_rows = &blocks[group[0].block];
+            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
+            let stride = sampler.run();
+            // Where the value may change: rows of the table and of the product.
+            let (mut rows, mut raws) = (Vec::new(), Vec::new());
+            for segment in group {
+                let mut raw = segment.raw.start;
+                while raw < segment.raw.end {
+                    rows.push(segment.first + (raw - segment.raw.start));
+                    raws.push(raw);
+                    raw = (raw / stride + 1).saturating_mul(stride);
+                }
+            }
+            sampler.pick(&raws, &mut scratch);
+            for (row, &value) in rows.into_iter().zip(&scratch.quantities[quantity as usize]) {
+                if values.last().is_none_or(|last| last.to_bits() != value.to_bits()) {
                     values.push(value);
                     starts.push(row);
                 }
             }
-        };
-        for group in segments.chunk_by(|one, next| one.block == next.block) {
-            let block_rows = &blocks[group[0].block];
-            let sampler = Sampler::new(&block_rows.block, &block_rows.digits, &[quantity], None);
-            let (axis, mut last) = (block_rows.axis(quantity), None);
-            for segment in group {
-                let stride = sampler.run().unwrap_or(u64::MAX);
-                let mut raw = segment.raw.start;
-                while raw < segment.raw.end {
-                    let step = axis.map(|(digit, _)| digit.step(raw));
-                    if step.is_none() || step != last {
-                        rows.push((segment.first + (raw - segment.raw.start), raw));
-                    }
-                    last = step;
-                    raw = (raw / stride + 1).saturating_mul(stride);
-                }
-                if rows.len() as u64 >= BATCH_POINTS {
-                    take(&sampler, &mut rows, axis.is_none());
-                }
-            }
-            take(&sampler, &mut rows, axis.is_none());
         }
         Some(Runs { values, order: Order::Listed(starts) })
     }
@@ -176,7 +154,7 @@ enum Order {
 }
 
 impl Runs {
-    /// The values in the order of their first row: one for each step of a factor axis, else one for each run.
+    /// The values in the order of their first row: one for each step of a factor axis over one segment, else one for each run.
     pub fn values(&self) -> &[f64] {
         &self.values
     }

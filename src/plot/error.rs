@@ -1,7 +1,6 @@
 //! The error of a picture.
 
-use crate::dataset::ReadError;
-use crate::dataset::frame::FrameError;
+use crate::dataset::{DatasetError, FrameError};
 use crate::names::hint;
 
 /// The error of a picture.
@@ -22,9 +21,12 @@ pub enum PlotError {
     /// A Parquet trace cannot be read.
     #[error("{0}\n  help: delete the file and trace it again")]
     Trace(FrameError),
-    /// A part of a table cannot be read.
+    /// A part is damaged, or belongs to another dataset.
     #[error(transparent)]
-    Part(#[from] ReadError),
+    Part(#[from] DatasetError),
+    /// A part is found to be damaged during reading.
+    #[error("{0}\n  help: run the sweep again; it recomputes damaged parts alone")]
+    Frame(#[from] FrameError),
 }
 
 impl PlotError {

@@ -58,19 +58,10 @@ pub enum Format {
 pub enum AnswerError {
     /// The query failed.
     #[error("the query failed: {0}")]
-    Failed(PolarsError),
+    Failed(#[from] PolarsError),
     /// The answer cannot be written.
     #[error(transparent)]
     Write(#[from] io::Error),
-}
-
-impl From<PolarsError> for AnswerError {
-    fn from(error: PolarsError) -> AnswerError {
-        match &error {
-            PolarsError::IO { error: inner, .. } => AnswerError::Write(io::Error::new(inner.kind(), error.to_string())),
-            _ => AnswerError::Failed(error),
-        }
-    }
 }
 
 impl From<ParquetError> for AnswerError {

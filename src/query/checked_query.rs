@@ -3,12 +3,11 @@
 use std::collections::HashSet;
 use std::ops::ControlFlow;
 
-use sqlparser::ast::helpers::attached_token::AttachedToken;
 use sqlparser::ast::{
-    BinaryOperator, CaseWhen, CastKind, DataType, DuplicateTreatment, Expr, Function, FunctionArg, FunctionArgExpr,
-    FunctionArgumentList, FunctionArguments, GroupByExpr, Ident, JoinConstraint, JoinOperator, NamedWindowDefinition,
-    NamedWindowExpr, ObjectName, ObjectNamePart, OrderByExpr, OrderByKind, Query, Select, SelectItem, SetExpr,
-    Statement, TableFactor, UnaryOperator, Value, ValueWithSpan, VisitorMut, WindowType,
+    BinaryOperator, DuplicateTreatment, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr,
+    Ident, JoinConstraint, JoinOperator, NamedWindowDefinition, NamedWindowExpr, ObjectName, ObjectNamePart,
+    OrderByExpr, OrderByKind, Query, Select, SelectItem, SetExpr, Statement, TableFactor, UnaryOperator, Value,
+    ValueWithSpan, VisitorMut, WindowType,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
@@ -281,7 +280,7 @@ fn is_empty(group_by: &GroupByExpr) -> bool {
 }
 
 /// The expression of an item of SELECT.
-fn expression(item: &SelectItem) -> Option<&Expr> {
+pub fn expression(item: &SelectItem) -> Option<&Expr> {
     match item {
         SelectItem::UnnamedExpr(expression) | SelectItem::ExprWithAlias { expr: expression, .. } => Some(expression),
         _ => None,
@@ -289,7 +288,7 @@ fn expression(item: &SelectItem) -> Option<&Expr> {
 }
 
 /// The name of an item of SELECT; empty for several columns.
-fn item_name(item: &SelectItem) -> String {
+pub fn item_name(item: &SelectItem) -> String {
     match item {
         SelectItem::UnnamedExpr(expression) => name(expression),
         SelectItem::ExprWithAlias { alias, .. } => alias.value.clone(),
@@ -390,13 +389,17 @@ fn outer_condition(join: &JoinOperator) -> Option<&Expr> {
 
 /// Whether a condition contains only comparisons of columns with columns by `=`.
 fn is_equalities(condition: &Expr) -> bool {
-    let is_column = |side: &Expr| matches!(side, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
     match condition {
         Expr::Nested(inner) => is_equalities(inner),
         Expr::BinaryOp { left, op: BinaryOperator::And, right } => is_equalities(left) && is_equalities(right),
-        Expr::BinaryOp { left, op: BinaryOperator::Eq, right } => is_column(left) && is_column(right),
+        Expr::BinaryOp { left, op: BinaryOperator::Eq, right } => is_name(left) && is_name(right),
         _ => false,
     }
+}
+
+/// Whether an expression is the name of a column.
+pub fn is_name(expression: &Expr) -> bool {
+    matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_))
 }
 
 /// Whether an expression is a column, or all or some columns.
@@ -448,8 +451,7 @@ impl VisitorMut for Names {
                 number += 1;
                 free = format!("{name}_{number}");
             }
-            let is_plain = matches!(expression, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
-            if !is_plain || number > 0 {
+            if !is_name(&expression) || number > 0 {
                 *item = SelectItem::ExprWithAlias { expr: expression, alias: Ident::with_quote('"', free) };
             }
         }
@@ -457,7 +459,7 @@ impl VisitorMut for Names {
             return ControlFlow::Continue(());
         };
         for key in keys {
-            let is_plain = matches!(key.expr, Expr::Identifier(_) | Expr::CompoundIdentifier(_) | Expr::Value(_));
+            let is_plain = is_name(&key.expr) || matches!(key.expr, Expr::Value(_));
             let same = select.projection.iter().find_map(|item| match item {
                 SelectItem::ExprWithAlias { expr, alias } if *expr == key.expr => Some(alias.clone()),
                 _ => None,
@@ -515,10 +517,10 @@ impl VisitorMut for HavingTerms<'_> {
     fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
         if self.inside == 0 {
             if self.keys.contains(expression) {
-                *expression = least(expression);
+                *expression = parsed(format!("min({expression})"));
             } else if let Some(item) = meaning(expression, self.projection) {
-                *expression =
-                    if first_aggregate(item).is_some() { Expr::Nested(Box::new(item.clone())) } else { least(item) };
+                let function = if first_aggregate(item).is_some() { "" } else { "min" };
+                *expression = parsed(format!("{function}({item})"));
             }
         }
         self.inside += u32::from(matches!(expression, Expr::Function(function) if is_aggregate(function)));
@@ -531,23 +533,10 @@ impl VisitorMut for HavingTerms<'_> {
     }
 }
 
-/// The least value of an expression.
-fn least(argument: &Expr) -> Expr {
-    let list = FunctionArgumentList {
-        duplicate_treatment: None,
-        args: vec![FunctionArg::Unnamed(FunctionArgExpr::Expr(argument.clone()))],
-        clauses: Vec::new(),
-    };
-    Expr::Function(Function {
-        name: ObjectName::from(vec![Ident::new("min")]),
-        uses_odbc_syntax: false,
-        parameters: FunctionArguments::None,
-        args: FunctionArguments::List(list),
-        filter: None,
-        null_treatment: None,
-        over: None,
-        within_group: Vec::new(),
-    })
+/// The expression `sql`, put together from expressions of the query. If these are nested too deeply for more, it stays text, which polars refuses.
+pub fn parsed(sql: String) -> Expr {
+    let expression = Parser::new(&GenericDialect {}).try_with_sql(&sql).and_then(|mut parser| parser.parse_expr());
+    expression.unwrap_or_else(|_| Expr::Identifier(Ident::new(sql)))
 }
 
 /// The name of a column without `AS`, as in DuckDB; `count(*)` is `count`.
@@ -617,7 +606,7 @@ impl PolarsDialect {
             _ => None,
         };
         if column.is_some_and(|name| self.words.contains(&name.value)) {
-            *expression = cast(expression.clone(), DataType::Varchar(None));
+            *expression = text(expression);
         }
     }
 }
@@ -643,9 +632,9 @@ fn is_own_name(column: &Expr, name: &Ident) -> bool {
     matches!(column, Expr::CompoundIdentifier(names) if names.last().is_some_and(|last| last.value == name.value))
 }
 
-/// `expression` as `data_type`.
-pub fn cast(expression: Expr, data_type: DataType) -> Expr {
-    Expr::Cast { kind: CastKind::Cast, expr: Box::new(expression), data_type, array: false, format: None }
+/// `expression` as text.
+fn text(expression: &Expr) -> Expr {
+    parsed(format!("CAST({expression} AS VARCHAR)"))
 }
 
 impl VisitorMut for PolarsDialect {
@@ -695,7 +684,7 @@ impl VisitorMut for PolarsDialect {
             | Expr::ILike { expr, .. }
             | Expr::SimilarTo { expr, .. }
             | Expr::RLike { expr, .. } => {
-                **expr = cast((**expr).clone(), DataType::Varchar(None));
+                **expr = text(expr);
             }
             Expr::Substring { expr, .. } | Expr::Trim { expr, .. } | Expr::Position { r#in: expr, .. } => {
                 self.as_text(expr);
@@ -706,24 +695,13 @@ impl VisitorMut for PolarsDialect {
             }
             Expr::InList { list, .. } => numbers_alike(list),
             // polars would return null for null.
-            Expr::IsNotTrue(inner) => *expression = or_null(inner, Some(UnaryOperator::Not)),
-            Expr::IsNotFalse(inner) => *expression = or_null(inner, None),
+            Expr::IsNotTrue(inner) => *expression = parsed(format!("(({inner}) IS NULL OR NOT ({inner}))")),
+            Expr::IsNotFalse(inner) => *expression = parsed(format!("(({inner}) IS NULL OR ({inner}))")),
             Expr::Function(function) => self.function(function),
             _ => {}
         }
         ControlFlow::Continue(())
     }
-}
-
-/// Whether `condition`, after `operator`, is true or null.
-fn or_null(condition: &Expr, operator: Option<UnaryOperator>) -> Expr {
-    let condition = Box::new(Expr::Nested(Box::new(condition.clone())));
-    let is_null = Expr::IsNull(condition.clone());
-    let holds = match operator {
-        Some(op) => Expr::UnaryOp { op, expr: condition },
-        None => *condition,
-    };
-    Expr::Nested(Box::new(binary(is_null, BinaryOperator::Or, holds)))
 }
 
 /// Gives the nulls of the first key of a window their place. polars puts them first in either direction.
@@ -732,15 +710,9 @@ fn order_nulls(keys: &mut Vec<OrderByExpr>) {
     let descends = first.options.asc == Some(false);
     let nulls_first = first.options.nulls_first.unwrap_or(descends);
     // Of 0 and 1, the one that comes first in this direction.
-    let place = |comes_first: bool| Expr::value(Value::Number(u8::from(comes_first == descends).to_string(), false));
-    let is_null = Expr::IsNull(Box::new(first.expr.clone()));
-    let expr = Expr::Case {
-        case_token: AttachedToken::empty(),
-        end_token: AttachedToken::empty(),
-        operand: None,
-        conditions: vec![CaseWhen { condition: is_null, result: place(nulls_first) }],
-        else_result: Some(Box::new(place(!nulls_first))),
-    };
+    let place = |comes_first: bool| u8::from(comes_first == descends);
+    let (key, of_null, of_others) = (&first.expr, place(nulls_first), place(!nulls_first));
+    let expr = parsed(format!("CASE WHEN {key} IS NULL THEN {of_null} ELSE {of_others} END"));
     keys.insert(0, OrderByExpr { expr, ..first });
     keys.iter_mut().for_each(|key| key.options.nulls_first = None);
 }
@@ -774,11 +746,6 @@ impl PolarsDialect {
             }
         }
     }
-}
-
-/// `left` and `right`, joined by an operator.
-pub fn binary(left: Expr, op: BinaryOperator, right: Expr) -> Expr {
-    Expr::BinaryOp { left: Box::new(left), op, right: Box::new(right) }
 }
 
 /// The value of a whole number without a sign.

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use sqlparser::ast::{BinaryOperator, Expr, Query, UnaryOperator, Value, VisitorMut};
 
 use super::Source;
-use super::checked_query::name;
+use super::checked_query::{is_name, name};
 use super::walk::walk;
 use crate::table;
 
@@ -70,16 +70,15 @@ impl VisitorMut for Search<'_> {
     type Break = ();
 
     fn pre_visit_expr(&mut self, expression: &mut Expr) -> ControlFlow<()> {
-        let is_column = |side: &Expr| matches!(side, Expr::Identifier(_) | Expr::CompoundIdentifier(_));
         match &*expression {
             Expr::BinaryOp { left, op: BinaryOperator::Eq | BinaryOperator::NotEq, right } => {
                 for (column, constant) in [(left, right), (right, left)] {
-                    if is_column(column) {
+                    if is_name(column) {
                         self.read(&name(column), constant);
                     }
                 }
             }
-            Expr::InList { expr, list, .. } if is_column(expr) => {
+            Expr::InList { expr, list, .. } if is_name(expr) => {
                 list.iter().for_each(|constant| self.read(&name(expr), constant));
             }
             _ => {}

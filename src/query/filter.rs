@@ -157,13 +157,6 @@ fn each<T: Copy>(kept: &mut [bool], values: &[T], obeys: impl Fn(T) -> bool) {
     kept.iter_mut().zip(values).for_each(|(kept, &value)| *kept &= obeys(value));
 }
 
-/// The rows of a batch that match all conditions.
-pub fn kept(conditions: &[Condition], batch: &RecordBatch) -> Vec<bool> {
-    let mut kept = vec![true; batch.num_rows()];
-    conditions.iter().for_each(|condition| condition.mark(batch, &mut kept));
-    kept
-}
-
 /// The first rows in the order of a numeric column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Top {

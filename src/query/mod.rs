@@ -16,7 +16,6 @@ mod units;
 mod walk;
 
 use std::collections::HashSet;
-use std::path::Path;
 use std::sync::Arc;
 
 use indexmap::IndexSet;
@@ -45,15 +44,11 @@ pub struct Tables {
 pub struct Absent {
     /// Its name.
     pub name: String,
-    fault: Option<Arc<DatasetError>>,
+    /// The damage of a part.
+    pub fault: Option<Arc<DatasetError>>,
 }
 
 impl Absent {
-    /// Whether one of its parts is damaged.
-    pub fn is_damaged(&self) -> bool {
-        self.fault.is_some()
-    }
-
     /// Why it cannot be read.
     pub fn error(&self) -> QueryError {
         match &self.fault {
@@ -67,10 +62,7 @@ impl Absent {
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum QueryError {
-    /// The path leads to no table.
-    #[error("{path}: {found}\n  expected: {expected}\n  help: {help}")]
-    Path { path: String, found: String, expected: &'static str, help: String },
-    /// The query is not valid for these tables.
+    /// The path leads to no table, or the query is not valid for its tables.
     #[error("{found}\n  help: {help}")]
     Sql { found: String, help: String },
     /// A part is damaged, or belongs to another dataset.
@@ -105,7 +97,7 @@ impl QueryError {
 
     /// Whether the path or the query is wrong, rather than the files or the machine.
     pub fn is_wrong(&self) -> bool {
-        matches!(self, QueryError::Path { .. } | QueryError::Sql { .. })
+        matches!(self, QueryError::Sql { .. })
     }
 }
 
@@ -126,19 +118,6 @@ fn sorted(frame: LazyFrame, schema: &Schema) -> LazyFrame {
 }
 
 impl Tables {
-    fn of(source: Source) -> Tables {
-        Tables { sources: vec![source], absent: Vec::new() }
-    }
-
-    /// Opens the tables of the dataset in `path`. A folder of Parquet files, or a Parquet or CSV file, is one table under its name.
-    ///
-    /// # Errors
-    ///
-    /// If there is no table, or if one of its files cannot be read.
-    pub fn open(path: &Path) -> Result<Tables, QueryError> {
-        source::open(path)
-    }
-
     /// The answer to a SQL query, computed when it is read.
     ///
     /// # Errors
@@ -226,15 +205,12 @@ impl Tables {
     /// The columns of words that a query names.
     fn words(&self, sql: &str, checked: &CheckedQuery) -> Vec<String> {
         let named: HashSet<&str> = sql.split(|letter: char| !(letter.is_alphanumeric() || letter == '_')).collect();
-        let read = self.sources.iter().filter(|source| checked.read.contains(&source.name));
-        let schemas = read.filter_map(|source| source.frame.clone().collect_schema().ok());
-        let words: IndexSet<String> = schemas
-            .flat_map(|schema| {
-                let words = schema.iter().filter(|(_, kind)| kind.is_categorical() || kind.is_string());
-                words.map(|(name, _)| name.to_string()).collect::<Vec<_>>()
-            })
-            .filter(|name| named.contains(name.as_str()))
-            .collect();
+        let mut words = IndexSet::new();
+        for source in self.sources.iter().filter(|source| checked.read.contains(&source.name)) {
+            let Ok(schema) = source.frame.clone().collect_schema() else { continue };
+            let of_words = schema.iter().filter(|(_, kind)| kind.is_categorical() || kind.is_string());
+            words.extend(of_words.map(|(name, _)| name.to_string()).filter(|name| named.contains(name.as_str())));
+        }
         words.into_iter().collect()
     }
 

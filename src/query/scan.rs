@@ -25,7 +25,7 @@ use polars::prelude::{
 };
 use rayon::prelude::*;
 
-use super::filter::{Condition, Top, kept, of_predicate};
+use super::filter::{Condition, Top, of_predicate};
 use super::groups::{GroupAggregation, GroupQuery};
 use crate::dataset::{self, label};
 
@@ -33,7 +33,8 @@ use crate::dataset::{self, label};
 #[derive(Clone)]
 pub struct Files {
     paths: Vec<PathBuf>,
-    schema: SchemaRef,
+    /// Its columns and their types.
+    pub schema: SchemaRef,
     /// The condition of rows; others are skipped.
     conditions: Vec<Condition>,
     /// The order of rows, if only the first are needed.
@@ -50,11 +51,6 @@ impl Files {
             }
         }
         Ok(Files { paths, schema: Arc::new(schema), conditions: Vec::new(), top: None })
-    }
-
-    /// Its columns and their types.
-    pub fn schema(&self) -> &Schema {
-        &self.schema
     }
 
     /// Restricts the table to rows that match `conditions`, and in each part to rows that may be among the first.
@@ -91,7 +87,9 @@ impl Files {
 
     /// Each file as a separate table.
     pub fn parts(&self) -> Vec<Files> {
-        self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..self.clone() }).collect()
+        // Without all paths in each clone.
+        let none = Files { paths: Vec::new(), ..self.clone() };
+        self.paths.iter().map(|path| Files { paths: vec![path.clone()], ..none.clone() }).collect()
     }
 
     /// The columns `names` without rows.
@@ -109,7 +107,23 @@ impl Files {
         most: Option<usize>,
     ) -> PolarsResult<DataFrame> {
         let predicate = predicate.map(without_hints).transpose()?.flatten();
-        let frame = sound(path, || self.decode(path, names, predicate.as_ref(), most))?;
+        let mut conditions = self.conditions.clone();
+        conditions.extend(predicate.iter().flat_map(|predicate| of_predicate(predicate).0));
+        let names_read = names.iter().map(PlSmallStr::as_str).chain(self.top.iter().map(|top| top.column.as_str()));
+        // A filter drops rows, so more have to be read.
+        let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
+        let mut frame = self.empty(names)?;
+        let mut take = |batch: RecordBatch, mut kept: Vec<bool>| {
+            if let Some(top) = &self.top {
+                top.mark(&batch, &mut kept);
+            }
+            let batch = match kept.iter().all(|kept| *kept) {
+                true => batch,
+                false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
+            };
+            append(&mut frame, columns(&batch, names)?).map_err(foreign)
+        };
+        sound(path, || self.batches(path, names_read, &conditions, most, &mut take))?;
         match predicate {
             Some(predicate) => frame.lazy().filter(predicate).collect(),
             None => Ok(frame),
@@ -263,37 +277,11 @@ impl Files {
         }
         for batch in builder.build()? {
             let batch = batch?;
-            let kept = kept(conditions, &batch);
+            let mut kept = vec![true; batch.num_rows()];
+            conditions.iter().for_each(|condition| condition.mark(&batch, &mut kept));
             take(batch, kept)?;
         }
         Ok(())
-    }
-
-    /// The columns `names` of the rows of a file that `predicate` may keep.
-    fn decode(
-        &self,
-        path: &Path,
-        names: &[PlSmallStr],
-        predicate: Option<&Expr>,
-        most: Option<usize>,
-    ) -> Result<DataFrame, ParquetError> {
-        let mut conditions = self.conditions.clone();
-        conditions.extend(predicate.into_iter().flat_map(|predicate| of_predicate(predicate).0));
-        let names_read = names.iter().map(PlSmallStr::as_str).chain(self.top.iter().map(|top| top.column.as_str()));
-        // A filter drops rows, so more have to be read.
-        let most = most.filter(|_| conditions.is_empty() && self.top.is_none());
-        let mut frame = self.empty(names).map_err(foreign)?;
-        self.batches(path, names_read, &conditions, most, &mut |batch, mut kept| {
-            if let Some(top) = &self.top {
-                top.mark(&batch, &mut kept);
-            }
-            let batch = match kept.iter().all(|kept| *kept) {
-                true => batch,
-                false => filter_record_batch(&batch, &BooleanArray::from(kept))?,
-            };
-            append(&mut frame, columns(&batch, names)?).map_err(foreign)
-        })?;
-        Ok(frame)
     }
 }
 

@@ -9,11 +9,11 @@ use polars::prelude::{DataFrame, IntoLazy, LazyFrame, PolarsError, PolarsResult}
 use polars_io::SerReader;
 use polars_io::prelude::{CsvParseOptions, CsvReadOptions, CsvReader};
 
-use super::comparisons::Comparisons;
 use super::scan::Files;
-use super::{Absent, Answer, QueryError, Tables};
+use super::{Absent, QueryError, Tables};
 use crate::dataset::Folder;
 use crate::dataset::frame::{self, FrameError};
+use crate::file;
 use crate::sweep::path_hint;
 
 /// A table and its files.
@@ -39,71 +39,76 @@ pub struct Source {
 /// The tables of a query.
 const EXPECTED: &str = "the folder of a dataset, such as results/NAME, or a Parquet or CSV file";
 
-/// The tables in `path`.
-///
-/// # Errors
-///
-/// A path without tables, or a file that cannot be read.
-pub fn open(path: &Path) -> Result<Tables, QueryError> {
-    let wrong = |found: &str, help: &str| QueryError::Path {
-        path: path.display().to_string(),
-        found: found.to_owned(),
-        expected: EXPECTED,
-        help: help.to_owned(),
-    };
-    if path.is_dir() {
-        // The folder of a table belongs to its dataset, and is checked like it.
-        if let (Some(above), Some(name)) = (folder_above(path), path.file_name())
-            && let Ok(Some(_)) = Folder::at(&above).manifest()
-        {
-            let mut tables = open(&above)?;
-            tables.sources.retain(|source| *source.name == *name.to_string_lossy());
-            if !tables.sources.is_empty() {
-                return Ok(tables);
-            }
-        }
-        let folder = Folder::at(path);
-        let manifest = folder.manifest().map_err(|error| wrong(&error.to_string(), "name another folder"))?;
-        let Some(manifest) = manifest else {
-            let files = parts(path);
-            if files.is_empty() {
-                return Err(wrong(
-                    "holds neither a manifest.json nor Parquet files",
-                    "name a folder that `slipsweep run` wrote",
-                ));
-            }
-            return Source::parquet(path, name_of(path), files, 0, None).map(Tables::of);
+impl Tables {
+    /// Opens the tables of the dataset in `path`. A folder of Parquet files, or a Parquet or CSV file, is one table under its name.
+    ///
+    /// # Errors
+    ///
+    /// If there is no table, or if one of its files cannot be read.
+    pub fn open(path: &Path) -> Result<Tables, QueryError> {
+        let wrong = |found: &str, help: &str| {
+            QueryError::sql(format!("{}: {found}\n  expected: {EXPECTED}", path.display()), help)
         };
-        let (mut sources, mut absent) = (Vec::new(), Vec::new());
-        for table in &manifest.tables {
-            let name = table.name.clone();
-            match folder.verified(&manifest, table) {
-                Ok((files, _)) if files.is_empty() => absent.push(Absent { name, fault: None }),
-                Ok((files, missing)) => sources.push(Source::parquet(path, name, files, missing, Some(table.rows))?),
-                Err(fault) => absent.push(Absent { name, fault: Some(Arc::new(fault)) }),
+        if path.is_dir() {
+            // The folder of a table belongs to its dataset, and is checked like it.
+            let above = fs::canonicalize(path).ok().and_then(|real| real.parent().map(Path::to_owned));
+            if let (Some(above), Some(name)) = (above, path.file_name())
+                && let Ok(Some(_)) = Folder::at(&above).manifest()
+            {
+                let mut tables = Tables::open(&above)?;
+                tables.sources.retain(|source| *source.name == *name.to_string_lossy());
+                if !tables.sources.is_empty() {
+                    return Ok(tables);
+                }
             }
-        }
-        if sources.is_empty() {
-            if let Some(damaged) = absent.iter().find(|table| table.fault.is_some()) {
-                return Err(damaged.error());
+            let folder = Folder::at(path);
+            let manifest = folder.manifest().map_err(|error| wrong(&error.to_string(), "name another folder"))?;
+            let Some(manifest) = manifest else {
+                let files = parts(path);
+                if files.is_empty() {
+                    return Err(wrong(
+                        "holds neither a manifest.json nor Parquet files",
+                        "name a folder that `slipsweep run` wrote",
+                    ));
+                }
+                return Source::parquet(path, name_of(path), files, 0, None).map(Tables::of);
+            };
+            let (mut sources, mut absent) = (Vec::new(), Vec::new());
+            for table in &manifest.tables {
+                let name = table.name.clone();
+                match folder.verified(&manifest, table) {
+                    Ok((files, _)) if files.is_empty() => absent.push(Absent { name, fault: None }),
+                    Ok((files, missing)) => {
+                        sources.push(Source::parquet(path, name, files, missing, Some(table.rows))?)
+                    }
+                    Err(fault) => absent.push(Absent { name, fault: Some(Arc::new(fault)) }),
+                }
             }
-            return Err(wrong("the dataset has no parts yet", "compute them with `slipsweep run`"));
+            if sources.is_empty() {
+                if let Some(damaged) = absent.iter().find(|table| table.fault.is_some()) {
+                    return Err(damaged.error());
+                }
+                return Err(wrong("the dataset has no parts yet", "compute them with `slipsweep run`"));
+            }
+            return Ok(Tables { sources, absent });
         }
-        return Ok(Tables { sources, absent });
+        if !path.exists() {
+            return Err(wrong("there is no such file or folder", &path_hint(path, "")));
+        }
+        if !path.is_file() {
+            return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));
+        }
+        match file::ending(path).as_str() {
+            "parquet" => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
+            "csv" => Source::csv(path),
+            _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
+        }
+        .map(Tables::of)
     }
-    if !path.exists() {
-        return Err(wrong("there is no such file or folder", &path_hint(path, "")));
+
+    fn of(source: Source) -> Tables {
+        Tables { sources: vec![source], absent: Vec::new() }
     }
-    if !path.is_file() {
-        return Err(wrong("a device or a named pipe, not a file", "write it to a file, and name that file"));
-    }
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-    match ending.as_deref() {
-        Some("parquet") => Source::parquet(path, name_of(path), vec![path.to_owned()], 0, None),
-        Some("csv") => Source::csv(path),
-        _ => return Err(wrong("neither a folder nor a file that ends in .parquet or .csv", "check the path")),
-    }
-    .map(Tables::of)
 }
 
 impl Source {
@@ -143,17 +148,6 @@ impl Source {
             frame: frame.lazy(),
         })
     }
-
-    /// The first `count` rows.
-    ///
-    /// # Errors
-    ///
-    /// If the table cannot be read.
-    pub fn first(&self, count: u32) -> Result<Answer, QueryError> {
-        let (columns, units) = (self.columns.clone(), self.units.clone());
-        let frame = self.frame.clone().limit(count);
-        Ok(Answer { columns, units, comparisons: Comparisons::default(), frame, streaming: None })
-    }
 }
 
 /// The rows of a CSV file, and the units of its columns if a comment of `slipsweep trace` states them.
@@ -181,21 +175,12 @@ fn csv(path: &Path) -> PolarsResult<(DataFrame, Option<Vec<String>>)> {
     Ok((CsvReader::new(Cursor::new(&bytes)).with_options(options).finish()?, units))
 }
 
-/// The folder that a folder is in.
-fn folder_above(path: &Path) -> Option<PathBuf> {
-    Some(fs::canonicalize(path).ok()?.parent()?.to_owned())
-}
-
 /// The Parquet files in a folder, in the order of their names.
 fn parts(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_part = |path: &PathBuf| {
+    file::sorted(folder, |path| {
         let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
         !hidden && path.is_file() && path.extension().is_some_and(|ending| ending == "parquet")
-    };
-    let mut files: Vec<PathBuf> = entries.filter(is_part).collect();
-    files.sort();
-    files
+    })
 }
 
 /// The name of a file or folder as an identifier that needs no quotes in SQL.

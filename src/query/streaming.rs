@@ -7,14 +7,14 @@ use std::collections::HashSet;
 use std::ops::ControlFlow;
 
 use sqlparser::ast::{
-    BinaryOperator, DataType, ExactNumberInfo, Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments,
-    GroupByExpr, Ident, LimitClause, OrderByKind, Query, Select, SelectItem, SetExpr, TableFactor, VisitorMut,
+    Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, GroupByExpr, Ident, LimitClause, OrderByKind,
+    Query, Select, SelectItem, SetExpr, TableFactor, VisitorMut,
 };
 use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::Parser;
 
 use super::Source;
-use super::checked_query::{binary, cast, is_one_of, name, whole_number};
+use super::checked_query::{expression, is_one_of, item_name, parsed, whole_number};
 use super::filter::{Top, of_where};
 use super::groups::{Aggregate, GroupQuery, Kind, Measure};
 use super::scan::Files;
@@ -91,7 +91,7 @@ pub fn streaming(query: &Query, sources: &[Source]) -> Option<StreamPlan> {
     if !modifiers.is_empty() {
         return None;
     }
-    let conditions = of_where(select.selection.as_ref(), files.schema());
+    let conditions = of_where(select.selection.as_ref(), &files.schema);
     let condition = select.selection.map(|condition| condition.to_string());
     let table_query = TableQuery { source, items, condition, having: select.having, ordered };
     let (partial, groups, top) = if groups.is_empty() && !plain.aggregates {
@@ -165,12 +165,10 @@ fn items(select: &Select, source: &Source) -> Option<Vec<(String, Expr)>> {
     let mut items = Vec::new();
     for item in &select.projection {
         match item {
-            SelectItem::UnnamedExpr(expression) => items.push((name(expression), expression.clone())),
-            SelectItem::ExprWithAlias { expr, alias } => items.push((alias.value.clone(), expr.clone())),
             SelectItem::Wildcard(options) if options.to_string().is_empty() => {
                 items.extend(source.columns.iter().map(|column| (column.clone(), quoted(column))));
             }
-            _ => return None,
+            item => items.push((item_name(item), expression(item)?.clone())),
         }
     }
     let mut names = HashSet::new();
@@ -233,7 +231,7 @@ impl TableQuery<'_> {
     /// The rows of a part that may be among the first `most`, if the first of `keys` is a column of numbers.
     fn top(&self, keys: &[Key], most: usize, files: &Files) -> Option<Top> {
         let (column, key) = (column_name(self.ordered.first()?)?.to_owned(), *keys.first()?);
-        let is_number = Kind::of(&column, files.schema()) == Some(Kind::Number);
+        let is_number = Kind::of(&column, &files.schema) == Some(Kind::Number);
         is_number.then_some(Top { column, key, most, is_only_key: keys.len() == 1 })
     }
 
@@ -246,7 +244,7 @@ impl TableQuery<'_> {
 
     /// The query for the groups of a part, and the plan that computes the answer from them.
     fn groups(&self, groups: Vec<Expr>, files: &Files) -> Option<(String, GroupPlan)> {
-        let is_column = |group: &Expr| column_name(group).is_some_and(|name| files.schema().contains(name));
+        let is_column = |group: &Expr| column_name(group).is_some_and(|name| files.schema.contains(name));
         let key = |group: Expr| if is_column(&group) { group } else { item(&group, &self.items).unwrap_or(group) };
         let keys: Vec<Expr> = groups.into_iter().map(key).collect();
         let mut lift = AggregateExtractor { keys: &keys, aggregates: Vec::new() };
@@ -275,7 +273,7 @@ impl TableQuery<'_> {
         let finish = sql(&columns, PARTS, &[("WHERE", having.as_slice()), ("ORDER BY", order)]);
         let merge = sql(&merged, PARTS, &[("GROUP BY", &names)]);
         let plain = keys.iter().map(|key| column_name(key).map(str::to_owned)).collect::<Option<Vec<_>>>();
-        let columns = plain.and_then(|keys| GroupQuery::new(keys, aggregates, files.schema()));
+        let columns = plain.and_then(|keys| GroupQuery::new(keys, aggregates, &files.schema));
         Some((sql(&found, &self.source.name, &partial), GroupPlan { columns, merge, finish }))
     }
 }
@@ -334,9 +332,8 @@ impl AggregateExtractor<'_> {
             _ => {
                 let sum = self.column(Measure::Sum, &format!("CAST({argument} AS DOUBLE)"), column);
                 let count = self.column(Measure::Count, &argument, column);
-                let count = cast(count, DataType::Double(ExactNumberInfo::None));
                 // The mean of no values is null, as their sum is.
-                Expr::Nested(Box::new(binary(sum, BinaryOperator::Divide, count)))
+                parsed(format!("({sum} / CAST({count} AS DOUBLE))"))
             }
         })
     }

@@ -64,8 +64,6 @@ pub struct Request {
     pub members: Option<RowIndex>,
     /// The hash of the inputs of its rows, once computed.
     pub(super) hash: OnceLock<String>,
-    /// The factor of each column from the units of the model to those of the grid.
-    pub sizes: Vec<f64>,
 }
 
 /// Help for a path that cannot be read: the dataset of this name, or the nearest name with this ending in the same folder, if any.
@@ -206,17 +204,15 @@ impl Sweep {
 }
 
 impl Request {
-    /// The request of `table` over `row_index`, rows of `grid`.
+    /// The request of `table` over `row_index`.
     pub(super) fn new(
         table: &'static Table,
         projection: Projection,
         rtol: f64,
         row_index: RowIndex,
         members: Option<RowIndex>,
-        grid: &Grid,
     ) -> Request {
-        let sizes = projection.indices().iter().map(|&column| table.columns()[column].size(grid)).collect();
-        Request { table, projection, rtol, rows: row_index.rows(), row_index, members, hash: OnceLock::new(), sizes }
+        Request { table, projection, rtol, rows: row_index.rows(), row_index, members, hash: OnceLock::new() }
     }
 
     /// Whether the table needs optimal protocols that are shared.
@@ -423,7 +419,7 @@ fn request(
             help,
         );
     }
-    Ok(Request::new(table, projection, rtol, row_index, members, grid))
+    Ok(Request::new(table, projection, rtol, row_index, members))
 }
 
 /// The fault of a table at `key` with too many rows.

@@ -98,7 +98,7 @@ impl Sweep {
         let axes = grid.blocks.iter().flat_map(|block| &block.factors).flat_map(|factor| &factor.axes);
         let warnings =
             axes.filter_map(|axis| doubtful_axis(axis.quantity.name().to_owned(), &grid.units, axis)).collect();
-        let request = Request::new(table, projection, rtol, row_index, None, &grid);
+        let request = Request::new(table, projection, rtol, row_index, None);
         Ok(Sweep {
             name: table.name().to_owned(),
             description: String::new(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::{iter, mem};
 
 use super::read;
-use crate::names::{nearest, shown};
+use crate::names::{hint_or, shown};
 
 /// The error of a spec: a fault, and others that do not follow from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -151,9 +151,6 @@ pub fn refuse<T>(
 
 /// The fault of a name that is not in `known`, with the nearest known name.
 pub fn unknown(key: String, what: &str, name: &str, known: &[&str]) -> SpecError {
-    let help = match nearest(name, known.iter().copied()) {
-        Some(meant) => format!("did you mean `{meant}`?"),
-        None => "remove it, or choose one of these".to_owned(),
-    };
+    let help = hint_or(name, known.iter().copied(), "remove it, or choose one of these");
     SpecError::new(key, format!("unknown {what} `{name}`"), known.join(", "), help)
 }

@@ -9,7 +9,7 @@ use super::check::{Request, Sweep};
 use super::read;
 use crate::dataset::DatasetError;
 use crate::grid::{Block, Quantity};
-use crate::model::{Friction, Units};
+use crate::model::Units;
 use crate::names::shown;
 use crate::table;
 
@@ -34,10 +34,7 @@ impl Sweep {
     /// the condition.
     fn facts(&self, request: &Request, fact: &mut dyn FnMut(&str, fmt::Arguments<'_>)) {
         fact("model.velocity_bound", format_args!("{}", self.bounded));
-        // Datasets of earlier versions have the logarithm.
-        if self.friction != Friction::Log {
-            fact("model.friction", format_args!("{}", self.friction.name()));
-        }
+        fact("model.friction", format_args!("{}", self.friction.name()));
         match &self.grid.units {
             Units::Scaled => fact("model.units", format_args!("dimensionless")),
             Units::Si(scales) => {

@@ -53,7 +53,6 @@ impl Sweep {
             tuples: request.row_index.tuples(OPTIMUM_AXES),
             members: request.members.as_ref(),
             projection: &request.projection,
-            sizes: &request.sizes,
             bounded: self.bounded,
             friction: self.friction,
             rtol: request.rtol,

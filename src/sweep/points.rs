@@ -29,12 +29,11 @@ use crate::table::{self, STATUS};
 /// A file that cannot be read, an unknown column, or an illegal value.
 pub fn read(path: &Path, units: &Units) -> Result<Factor, SpecError> {
     let name = path.display();
-    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
     let file = check_size(path)?;
-    let columns = match extension.as_ref().and_then(|extension| extension.to_str()) {
-        Some("csv") => csv(path, file, units)?,
+    let columns = match file::ending(path).as_str() {
+        "csv" => csv(path, file, units)?,
         // A panic of the reader on a damaged file is a fault of the file.
-        Some("parquet") => {
+        "parquet" => {
             guarded(|| parquet(path, file, units)).unwrap_or_else(|| Err(unreadable(path, &"it is damaged")))?
         }
         _ => {
@@ -248,10 +247,7 @@ fn cells_of<'a>(place: &str, line: &'a str) -> Result<Vec<Cow<'a, str>>, SpecErr
             continue;
         };
         // A doubled quote is a quote.
-        let mut end = quoted.find('"');
-        while let Some(place) = end.filter(|place| quoted[place + 1..].starts_with('"')) {
-            end = quoted[place + 2..].find('"').map(|next| place + 2 + next);
-        }
+        let end = quoted.replace("\"\"", "__").find('"');
         let after = end.map(|end| (&quoted[..end], quoted[end + 1..].trim_start()));
         let Some((cell, after)) = after.filter(|(_, after)| after.is_empty() || after.starts_with(',')) else {
             let found = format!("{place}: the quote in `{line}` is not closed on its line");
@@ -275,7 +271,7 @@ fn parquet(path: &Path, file: File, units: &Units) -> Result<Vec<Column>, SpecEr
     let rows = reader.metadata().file_metadata().num_rows();
     check_count(path, usize::try_from(rows).unwrap_or(0))?;
     let mut columns = header(&name, reader.schema().fields().iter().map(|field| field.name().as_str()))?;
-    let reader = reader.with_batch_size(BATCH_ROWS).build().map_err(|error| unreadable(path, &error))?;
+    let reader = reader.build().map_err(|error| unreadable(path, &error))?;
     let mut first = 0;
     for batch in reader {
         let batch = batch.map_err(|error| unreadable(path, &error))?;
@@ -322,9 +318,6 @@ fn texts_of(column: &ArrayRef) -> impl Iterator<Item = Option<&str>> {
     let cell = move |key: Option<i32>| words.zip(key).map(|(words, key)| words.value(key as usize));
     column.into_iter().flat_map(|column| column.keys()).map(cell)
 }
-
-/// Rows of a record batch. Chosen: a column of them fits a cache of 512 KiB.
-const BATCH_ROWS: usize = 1 << 16;
 
 /// The values of a column of numbers; `None` for decimals and halves.
 fn numbers(column: &ArrayRef) -> Option<Vec<f64>> {

@@ -27,7 +27,7 @@ impl Spec {
                 SpecError::new("", format!("not TOML: {}", error.message()), "key = value, [table] or # comment", help);
             Box::new((SpecError { line: error.span().map(|span| line_of(text, span.start)), ..fault }, None))
         })?;
-        let document = document.into_inner();
+        let entries = entries(document.get_ref(), "");
         let (mut rest, mut known) = (text.to_owned(), None);
         loop {
             let error: toml::de::Error = match (toml::from_str(&rest), known) {
@@ -39,8 +39,11 @@ impl Spec {
                 }
             };
             let span = error.span().unwrap_or_default();
-            let key = key_at(&document, "", span.start).unwrap_or_default();
-            let entry = find(&document, &key).map(|entry| entry.start..entry.value.span().end);
+            let has =
+                |entry: &&Entry| [&entry.name, &entry.value.span()].iter().any(|written| written.contains(&span.start));
+            let entry = entries.iter().rfind(has);
+            let key = entry.map(|entry| entry.key.clone()).unwrap_or_default();
+            let entry = entry.map(|entry| entry.name.start..entry.value.span().end);
             let fault = SpecError { line: Some(line_of(text, span.start)), ..fault(text, span, key, error.message()) };
             let faults = SpecError::and(known, fault);
             // Without the entry other faults show, at the same places.
@@ -123,70 +126,54 @@ fn fault(text: &str, span: Range<usize>, key: String, message: &str) -> SpecErro
     SpecError::new(key, format!("found {found}"), expected, help)
 }
 
-/// The key of the innermost value below `table`, at `key`, whose text contains a byte.
-fn key_at(table: &DeTable<'_>, key: &str, byte: usize) -> Option<String> {
+/// A value of a spec.
+struct Entry<'a, 'i> {
+    /// Its key, as in `axes.v_i[2]`.
+    key: String,
+    /// Where its name is written; that of an item is its value.
+    name: Range<usize>,
+    value: &'a Spanned<DeValue<'i>>,
+}
+
+/// The values below `table`, at `key`, each before those inside it.
+fn entries<'a, 'i>(table: &'a DeTable<'i>, key: &str) -> Vec<Entry<'a, 'i>> {
     let dot = if key.is_empty() { "" } else { "." };
-    table.iter().find_map(|(name, value)| key_of(format!("{key}{dot}{}", name.get_ref()), name.span(), value, byte))
+    let values = table.iter().map(|(name, value)| (format!("{key}{dot}{}", name.get_ref()), name.span(), value));
+    values.flat_map(with_inner).collect()
 }
 
-/// `key`, or that of the innermost value below it, if its name or value contains a byte.
-fn key_of(key: String, name: Range<usize>, value: &Spanned<DeValue<'_>>, byte: usize) -> Option<String> {
-    let inner = match value.get_ref() {
-        DeValue::Table(table) => key_at(table, &key, byte),
-        DeValue::Array(items) => items
-            .iter()
-            .enumerate()
-            .find_map(|(index, item)| key_of(format!("{key}[{index}]"), item.span(), item, byte)),
-        _ => None,
+/// The value at a key whose name is written there, and the values inside it.
+fn with_inner<'a, 'i>((key, name, value): (String, Range<usize>, &'a Spanned<DeValue<'i>>)) -> Vec<Entry<'a, 'i>> {
+    let mut inner = match value.get_ref() {
+        DeValue::Table(table) => entries(table, &key),
+        DeValue::Array(items) => {
+            let items = items.iter().enumerate().map(|(index, item)| (format!("{key}[{index}]"), item.span(), item));
+            items.flat_map(with_inner).collect()
+        }
+        _ => Vec::new(),
     };
-    inner.or_else(|| (name.contains(&byte) || value.span().contains(&byte)).then_some(key))
+    inner.insert(0, Entry { key, name, value });
+    inner
 }
 
-/// The line of `key` (as in `axes.v_i[2]`), or of its longest existing prefix.
+/// The line of `key`, or of its longest existing prefix.
 pub fn line(text: &str, key: &str) -> Option<usize> {
     let document = DeTable::parse(text).ok()?;
-    Some(line_of(text, find(document.get_ref(), key)?.start))
+    let is_prefix = |entry: &Entry| {
+        key.strip_prefix(&entry.key).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+    };
+    let entry = entries(document.get_ref(), "").into_iter().rfind(is_prefix)?;
+    Some(line_of(text, entry.name.start))
 }
 
 /// The text of the value of `key`; `None` if it is missing or a table.
 pub fn value(text: &str, key: &str) -> Option<String> {
     let document = DeTable::parse(text).ok()?;
-    let found = find(document.get_ref(), key).filter(|found| found.is_whole)?;
+    let found = entries(document.get_ref(), "").into_iter().find(|entry| entry.key == key)?;
     let written = text.get(found.value.span())?;
     // The span of a `[table]` is that of its header.
     let is_value = !found.value.get_ref().is_table() || written.starts_with('{');
     is_value.then(|| written.split_whitespace().collect::<Vec<_>>().join(" "))
-}
-
-/// The entry of a key, or of its longest existing prefix.
-struct KeyEntry<'a, 'i> {
-    start: usize,
-    value: &'a Spanned<DeValue<'i>>,
-    /// Whether it is all of the key.
-    is_whole: bool,
-}
-
-fn find<'a, 'i>(document: &'a DeTable<'i>, key: &str) -> Option<KeyEntry<'a, 'i>> {
-    let entry = |table: &'a DeTable<'i>, name: &str| {
-        let (key, value) = table.get_key_value(name)?;
-        Some(KeyEntry { start: key.span().start, value, is_whole: true })
-    };
-    let mut steps = key.split(['.', '[', ']']).filter(|step| !step.is_empty());
-    let mut found = entry(document, steps.next()?)?;
-    for step in steps {
-        let next = match found.value.get_ref() {
-            DeValue::Table(table) => entry(table, step),
-            DeValue::Array(items) => step.parse().ok().and_then(|index: usize| {
-                items.get(index).map(|value| KeyEntry { start: value.span().start, value, is_whole: true })
-            }),
-            _ => None,
-        };
-        match next {
-            Some(next) => found = next,
-            None => return Some(KeyEntry { is_whole: false, ..found }),
-        }
-    }
-    Some(found)
 }
 
 fn line_of(text: &str, offset: usize) -> usize {

@@ -75,12 +75,9 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Shard, String> {
-        let form = || format!("expected I/N, such as 0/16 for the first of 16 shards, found `{text}`");
-        let (index, count) = text.split_once('/').ok_or_else(form)?;
-        let [index, count]: [u64; 2] = match (index.parse(), count.parse()) {
-            (Ok(index), Ok(count)) => [index, count],
-            _ => return Err(form()),
-        };
+        let numbers = text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+        let (index, count): (u64, u64) =
+            numbers.ok_or_else(|| format!("expected I/N, such as 0/16 for the first of 16 shards, found `{text}`"))?;
         if count == 0 || count > Self::MAX_COUNT {
             return Err(format!("{count} shards; expected from 1 to {}", Self::MAX_COUNT));
         }

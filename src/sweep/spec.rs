@@ -32,26 +32,18 @@ pub struct Spec {
 }
 
 /// The keys of a spec, with those of its block at the top level.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 struct Written {
-    #[serde(default)]
     name: String,
-    #[serde(default)]
     description: String,
     points: Option<PathBuf>,
-    #[serde(default)]
     zip: Vec<Vec<String>>,
     r#where: Option<String>,
-    #[serde(default)]
     block: Vec<BlockSpec>,
-    #[serde(default)]
     model: ModelSpec,
-    #[serde(default)]
     accuracy: AccuracySpec,
-    #[serde(default)]
     axes: IndexMap<String, AxisSpec>,
-    #[serde(default)]
     tables: IndexMap<String, TableSpec>,
 }
 
@@ -194,9 +186,6 @@ pub struct TableSpec {
     pub reduce: Option<String>,
 }
 
-/// The legal forms of an axis of numbers.
-pub const AXIS: &str = "a number, a list of numbers or a range such as { linspace = [first, last, count] }";
-
 impl<'de> Deserialize<'de> for AxisSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<AxisSpec, D::Error> {
         struct Forms;
@@ -205,7 +194,7 @@ impl<'de> Deserialize<'de> for AxisSpec {
             type Value = AxisSpec;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(AXIS)
+                f.write_str("a number, a list of numbers or a range such as { linspace = [first, last, count] }")
             }
 
             fn visit_i64<E>(self, number: i64) -> Result<AxisSpec, E> {

@@ -89,7 +89,8 @@ fn compute_by(
     if let Some(order) = order {
         scatter(buffer, &order);
     }
-    for (column, size) in buffer.columns.iter_mut().zip(job.sizes).filter(|(_, size)| **size != 1.0) {
+    let sizes = job.projection.indices().iter().map(|&index| COLUMNS[index].size(job.grid));
+    for (column, size) in buffer.columns.iter_mut().zip(sizes).filter(|(_, size)| *size != 1.0) {
         column.iter_mut().for_each(|cell| *cell *= size);
     }
     Ok(work)

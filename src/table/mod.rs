@@ -200,8 +200,6 @@ pub struct Job<'a> {
     pub members: Option<&'a RowIndex>,
     /// The projected columns.
     pub projection: &'a Projection,
-    /// The factor of each projected column from the units of the model to those of the grid.
-    pub sizes: &'a [f64],
     /// Whether optimal protocols obey `v >= 1`.
     pub bounded: bool,
     /// Form of the direct effect of friction.

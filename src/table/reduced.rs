@@ -138,9 +138,7 @@ fn compute(
     let (projection, signal) = (Projection::usual(gap::COLUMNS), Signal::default());
     let tuples = members.tuples(OPTIMUM_AXES);
     // Progress counts rows of this table, not of the landscape.
-    let sizes: Vec<f64> = gap::COLUMNS.iter().map(|column| column.size(job.grid)).collect();
-    let landscape =
-        Job { rows: members, tuples, projection: &projection, sizes: &sizes, signal: &signal, members: None, ..*job };
+    let landscape = Job { rows: members, tuples, projection: &projection, signal: &signal, members: None, ..*job };
     let mut all = RunStats::default();
     // One after another: all threads work on one landscape, so a part holds one landscape in memory.
     for (place, row) in rows.enumerate() {

@@ -35,6 +35,7 @@ pub fn each<R>(
         Some((quantity, runs.map(|value| job.grid.scaled_value(quantity, value))))
     };
     let axes: Vec<(Quantity, Runs)> = Quantity::ALL.into_iter().filter_map(axis).collect();
+    let sizes: Vec<f64> = job.projection.indices().iter().map(|&index| fields[index].column.size(job.grid)).collect();
     in_chunks(job, buffer, chunk, |RowChunk { place, mut columns, status }| {
         let start = rows.start + place as u64;
         let end = start + status.len() as u64;
@@ -52,7 +53,7 @@ pub fn each<R>(
             failpoint::panic_at(std::iter::once(at));
             let (found, values, spent) = row(tuples[tuple].0, &point);
             *status = found;
-            for ((column, &index), size) in columns.iter_mut().zip(job.projection.indices()).zip(job.sizes) {
+            for ((column, &index), size) in columns.iter_mut().zip(job.projection.indices()).zip(&sizes) {
                 column[place] = values.as_ref().map_or(f64::NAN, fields[index].cell) * size;
             }
             work += spent;

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser};
 
 use super::{Failure, whole, wrong};
-use crate::cli::output::{self, Output};
+use crate::cli::output::Output;
 use crate::grid::{Domain, Quantity, RTOL, Scale};
 use crate::model::{Friction, StateLaw};
 use crate::trace::{self, Disturbance};
@@ -117,13 +117,6 @@ pub(super) enum Format {
     Csv,
     /// With units and meanings (.parquet)
     Parquet,
-}
-
-impl output::Format for Format {
-    const ENDINGS: &'static [(&'static str, Format)] =
-        &[("csv", Format::Csv), ("parquet", Format::Parquet), ("txt", Format::Table)];
-    const TABLE: Format = Format::Table;
-    const PARQUET: Format = Format::Parquet;
 }
 
 /// The protocol that is shown after a disturbance.

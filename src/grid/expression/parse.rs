@@ -11,7 +11,7 @@ use sqlparser::tokenizer::Token;
 use super::super::block::Factor;
 use super::super::quantity::Quantity;
 use super::program::{Binary, Expression, Op, Unary};
-use crate::names::nearest;
+use crate::names::hint_or;
 
 /// Greatest length of an expression, in bytes. Chosen: a few lines of text. It bounds memory and depth.
 const MAX_BYTES: usize = 1000;
@@ -59,8 +59,7 @@ impl Fault {
 
     /// The fault of a name that is not in `known`.
     fn unknown(position: Option<u64>, what: &str, name: &str, known: &[&str]) -> Fault {
-        let meant = nearest(name, known.iter().copied()).map(|meant| format!("did you mean `{meant}`?"));
-        let help = meant.unwrap_or_else(|| "remove it, or choose one of these".to_owned());
+        let help = hint_or(name, known.iter().copied(), "remove it, or choose one of these");
         let shown = known[..known.len().min(MAX_SHOWN_NAMES)].join(", ");
         let expected = if known.len() > MAX_SHOWN_NAMES { format!("{shown}, ...") } else { shown };
         Fault::new(position, format!("unknown {what} `{name}`"), expected, help)
@@ -86,6 +85,21 @@ const FUNCTIONS: [(&str, Op); 15] = [
     ("power", Op::Binary(Binary::Power)),
 ];
 
+/// Operators but for equality, with the types of their operands and of their value.
+const OPERATORS: [(BinaryOperator, Binary, Kind, Kind); 11] = [
+    (BinaryOperator::Plus, Binary::Add, Kind::Number, Kind::Number),
+    (BinaryOperator::Minus, Binary::Subtract, Kind::Number, Kind::Number),
+    (BinaryOperator::Multiply, Binary::Multiply, Kind::Number, Kind::Number),
+    (BinaryOperator::Divide, Binary::Divide, Kind::Number, Kind::Number),
+    (BinaryOperator::PGExp, Binary::Power, Kind::Number, Kind::Number),
+    (BinaryOperator::Lt, Binary::Less, Kind::Number, Kind::Truth),
+    (BinaryOperator::LtEq, Binary::LessEqual, Kind::Number, Kind::Truth),
+    (BinaryOperator::Gt, Binary::Greater, Kind::Number, Kind::Truth),
+    (BinaryOperator::GtEq, Binary::GreaterEqual, Kind::Number, Kind::Truth),
+    (BinaryOperator::And, Binary::And, Kind::Truth, Kind::Truth),
+    (BinaryOperator::Or, Binary::Or, Kind::Truth, Kind::Truth),
+];
+
 /// The grammar, for messages.
 const GRAMMAR: &str = "axes, numbers, + - * / ^, comparisons, and, or, not, in (...), between, abs, sqrt, exp, ln (natural logarithm), \
                        log or log10 (to base 10), floor, ceil, min, max, pow";
@@ -97,12 +111,7 @@ impl Expression {
     ///
     /// A text that is not a number computed from `axes`.
     pub fn number(text: &str, axes: &[Quantity]) -> Result<Expression, Fault> {
-        let (expression, kind) = read(text, axes, None)?;
-        if kind == Kind::Number {
-            return Ok(expression);
-        }
-        let help = "use it in `where`, or compute a number";
-        Err(Fault::new(None, format!("`{text}` is true or false"), "a number", help))
+        read(text, axes, None, Kind::Number)
     }
 
     /// Parses a condition on `axes` and on the labels of `points`.
@@ -111,11 +120,7 @@ impl Expression {
     ///
     /// A text that is not a condition on `axes` and labels.
     pub fn condition(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<Expression, Fault> {
-        let (expression, kind) = read(text, axes, points)?;
-        if kind == Kind::Truth {
-            return Ok(expression);
-        }
-        Err(Fault::new(None, format!("`{text}` is a number"), "true or false", "compare it, as in `v_f > v_i`"))
+        read(text, axes, points, Kind::Truth)
     }
 }
 
@@ -126,8 +131,14 @@ enum Kind {
     Truth,
 }
 
-fn read(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
-    parse(text, axes, points).map_err(|fault| fault.located(text))
+fn read(text: &str, axes: &[Quantity], points: Option<&Factor>, wanted: Kind) -> Result<Expression, Fault> {
+    let (expression, kind) = parse(text, axes, points).map_err(|fault| fault.located(text))?;
+    let (is, expected, help) = match kind {
+        kind if kind == wanted => return Ok(expression),
+        Kind::Truth => ("true or false", "a number", "use it in `where`, or compute a number"),
+        Kind::Number => ("a number", "true or false", "compare it, as in `v_f > v_i`"),
+    };
+    Err(Fault::new(None, format!("`{text}` is {is}"), expected, help))
 }
 
 fn parse(text: &str, axes: &[Quantity], points: Option<&Factor>) -> Result<(Expression, Kind), Fault> {
@@ -337,42 +348,23 @@ impl Compiler<'_> {
     }
 
     fn binary(&mut self, whole: &Expr, left: &Expr, op: &BinaryOperator, right: &Expr) -> Result<Kind, Fault> {
-        let function = match op {
-            BinaryOperator::Plus => Binary::Add,
-            BinaryOperator::Minus => Binary::Subtract,
-            BinaryOperator::Multiply => Binary::Multiply,
-            BinaryOperator::Divide => Binary::Divide,
-            BinaryOperator::PGExp => {
-                if matches!(left, Expr::BinaryOp { op: BinaryOperator::PGExp, .. }) {
-                    let found = format!("`{whole}` can be read in two ways");
-                    return Err(Fault::new(position(whole), found, "one power", "add parentheses, as in `(2^3)^2`"));
-                }
-                Binary::Power
-            }
-            BinaryOperator::Lt => Binary::Less,
-            BinaryOperator::LtEq => Binary::LessEqual,
-            BinaryOperator::Gt => Binary::Greater,
-            BinaryOperator::GtEq => Binary::GreaterEqual,
-            BinaryOperator::Eq | BinaryOperator::NotEq => {
-                self.equal(left, right)?;
-                self.program.extend((*op == BinaryOperator::NotEq).then_some(Op::Unary(Unary::Not)));
-                return Ok(Kind::Truth);
-            }
-            BinaryOperator::And => Binary::And,
-            BinaryOperator::Or => Binary::Or,
-            _ => {
-                let help = match op {
-                    BinaryOperator::PGOverlap => "write `and`",
-                    BinaryOperator::StringConcat => "write `or`",
-                    _ => REMOVE,
-                };
-                return Err(Fault::new(None, format!("unexpected `{op}`"), GRAMMAR, help));
-            }
-        };
-        let (operands, kind) = match function {
-            Binary::And | Binary::Or => (Kind::Truth, Kind::Truth),
-            Binary::Less | Binary::LessEqual | Binary::Greater | Binary::GreaterEqual => (Kind::Number, Kind::Truth),
-            _ => (Kind::Number, Kind::Number),
+        if matches!(op, BinaryOperator::Eq | BinaryOperator::NotEq) {
+            self.equal(left, right)?;
+            self.program.extend((*op == BinaryOperator::NotEq).then_some(Op::Unary(Unary::Not)));
+            return Ok(Kind::Truth);
+        }
+        let is_power = |op: &BinaryOperator| *op == BinaryOperator::PGExp;
+        if is_power(op) && matches!(left, Expr::BinaryOp { op, .. } if is_power(op)) {
+            let found = format!("`{whole}` can be read in two ways");
+            return Err(Fault::new(position(whole), found, "one power", "add parentheses, as in `(2^3)^2`"));
+        }
+        let Some((_, function, operands, kind)) = OPERATORS.into_iter().find(|(known, ..)| known == op) else {
+            let help = match op {
+                BinaryOperator::PGOverlap => "write `and`",
+                BinaryOperator::StringConcat => "write `or`",
+                _ => REMOVE,
+            };
+            return Err(Fault::new(None, format!("unexpected `{op}`"), GRAMMAR, help));
         };
         self.operand(left, operands)?;
         self.operand(right, operands)?;

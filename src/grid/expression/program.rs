@@ -1,5 +1,7 @@
 //! Expressions as programs of a stack machine over columns.
 
+use std::collections::BTreeMap;
+
 use super::super::quantity::Quantity;
 
 /// An instruction. Truth is 1, falsehood 0.
@@ -66,29 +68,11 @@ pub struct Expression {
 pub struct Scratch {
     /// Number of points.
     pub length: usize,
-    quantities: [Vec<f64>; Quantity::ALL.len()],
-    labels: Vec<Vec<f64>>,
+    /// The values of each quantity.
+    pub quantities: [Vec<f64>; Quantity::ALL.len()],
+    /// The word indices of labels.
+    pub labels: BTreeMap<usize, Vec<f64>>,
     stack: Vec<Vec<f64>>,
-}
-
-impl Scratch {
-    /// The values of `quantity`.
-    pub fn column(&self, quantity: Quantity) -> &[f64] {
-        &self.quantities[quantity as usize]
-    }
-
-    /// The values of `quantity`, for writing.
-    pub fn column_mut(&mut self, quantity: Quantity) -> &mut Vec<f64> {
-        &mut self.quantities[quantity as usize]
-    }
-
-    /// The word indices of a label, for writing.
-    pub fn label_mut(&mut self, label: usize) -> &mut Vec<f64> {
-        if self.labels.len() <= label {
-            self.labels.resize_with(label + 1, Vec::new);
-        }
-        &mut self.labels[label]
-    }
 }
 
 impl Expression {
@@ -128,7 +112,7 @@ impl Expression {
             match *op {
                 Op::Axis(quantity) => stack[top - 1].extend_from_slice(&quantities[quantity as usize]),
                 Op::Label { label, .. } => {
-                    let column = labels.get(label).map_or(&[][..], Vec::as_slice);
+                    let column = labels.get(&label).map_or(&[][..], Vec::as_slice);
                     stack[top - 1].extend_from_slice(column);
                 }
                 Op::Number(number) => stack[top - 1].resize(*length, number),

@@ -10,7 +10,7 @@ use indexmap::IndexSet;
 use super::condition::Condition;
 use super::groups::Gridded;
 use crate::dataset::frame::{self, Cells, Frame, Heading};
-use crate::dataset::{Folder, Manifest, ReadError};
+use crate::dataset::{Folder, Manifest};
 use crate::grid::{Quantity, mixed};
 use crate::names;
 use crate::plot::{PlotError, label};
@@ -127,9 +127,9 @@ impl FilteredTable {
             let known: Vec<String> = manifest.tables.iter().map(|table| table.name.clone()).collect();
             PlotError::unknown("the dataset has no table", name, &known)
         })?;
-        let (parts, missing) = folder.verified(manifest, table).map_err(ReadError::from)?;
+        let (parts, missing) = folder.verified(manifest, table)?;
         let first = parts.first().ok_or_else(|| PlotError::Empty { table: name.to_owned() })?;
-        let (headings, _) = frame::headings(first).map_err(ReadError::from)?;
+        let (headings, _) = frame::headings(first)?;
         // The default for a damaged spec.
         let spec = Spec::parse(&manifest.spec).unwrap_or_default();
         let mut filtered = FilteredTable {
@@ -251,7 +251,7 @@ impl FilteredTable {
             };
             self.conditions.iter().all(holds)
         };
-        Ok(frame::read_where(part, names, &may_hold).map_err(ReadError::from)?)
+        Ok(frame::read_where(part, names, &may_hold)?)
     }
 
     /// The label of a group of rows, as [`FilteredTable::label`]; for empty cells, as in `no material`.
