@@ -11,6 +11,9 @@ use super::atomic;
 use super::folder::{DatasetError, Folder, MISSING};
 use super::manifest::Manifest;
 
+/// Attempts to publish a manifest while another one appears and disappears. Chosen: each attempt fails only if another process does both in between.
+const ATTEMPTS: usize = 4;
+
 /// A run that writes to a dataset.
 #[derive(Debug)]
 pub struct Session {
@@ -88,14 +91,19 @@ impl Folder {
     /// Publishes the manifest for `planned`, and returns it.
     fn publish(&self, planned: &Manifest) -> Result<Manifest, DatasetError> {
         let path = self.manifest_path();
-        let (manifest, action) = self.settle(planned)?;
-        let is_published = match action {
-            ManifestAction::Keep => true,
-            ManifestAction::Create => atomic::write_new(&path, &manifest.to_bytes())?,
-            ManifestAction::Replace => atomic::write(&path, &manifest.to_bytes()).map(|()| true)?,
-        };
-        // Another run may have created one first.
-        if is_published { Ok(manifest) } else { self.publish(planned) }
+        for _ in 0..ATTEMPTS {
+            let (manifest, action) = self.settle(planned)?;
+            // A run that creates a manifest may find that another run was faster.
+            let is_published = match action {
+                ManifestAction::Keep => true,
+                ManifestAction::Create => atomic::write_new(&path, &manifest.to_bytes())?,
+                ManifestAction::Replace => atomic::write(&path, &manifest.to_bytes()).map(|()| true)?,
+            };
+            if is_published {
+                return Ok(manifest);
+            }
+        }
+        Err(self.taken("manifest.json appeared and disappeared"))
     }
 
     fn taken(&self, what: &'static str) -> DatasetError {
