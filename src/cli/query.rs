@@ -240,8 +240,8 @@ fn answer(arguments: &Arguments) -> Result<(), Failure> {
     let Comparisons { words, numbers } = mem::take(&mut answer.comparisons);
     words.iter().for_each(note);
     let note_empty = |rows| {
-        let is_unexplained = rows == 0 && words.is_empty();
-        numbers.iter().filter(|_| is_unexplained).for_each(note);
+        let is_unexplained = rows <= 1 && words.is_empty();
+        numbers.iter().filter(|_| is_unexplained).filter_map(|number| tables.note_on(number)).for_each(note);
     };
     if arguments.output.is_stdout() {
         let mut out = stdout()?;

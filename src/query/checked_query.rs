@@ -712,7 +712,7 @@ fn order_nulls(keys: &mut Vec<OrderByExpr>) {
     // Of 0 and 1, the one that comes first in this direction.
     let place = |comes_first: bool| u8::from(comes_first == descends);
     let (key, of_null, of_others) = (&first.expr, place(nulls_first), place(!nulls_first));
-    let expr = parsed(format!("CASE WHEN {key} IS NULL THEN {of_null} ELSE {of_others} END"));
+    let expr = parsed(format!("CASE WHEN ({key}) IS NULL THEN {of_null} ELSE {of_others} END"));
     keys.insert(0, OrderByExpr { expr, ..first });
     keys.iter_mut().for_each(|key| key.options.nulls_first = None);
 }

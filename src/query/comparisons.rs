@@ -3,11 +3,12 @@
 use std::collections::HashSet;
 use std::ops::ControlFlow;
 
-use sqlparser::ast::{BinaryOperator, Expr, Query, UnaryOperator, Value, VisitorMut};
+use sqlparser::ast::{BinaryOperator, Expr, Query, Value, ValueWithSpan, VisitorMut};
 
-use super::Source;
 use super::checked_query::{is_name, name};
 use super::walk::walk;
+use super::{Source, Tables};
+use crate::dataset::Cell;
 use crate::table;
 
 /// Notes on the comparisons of a query.
@@ -15,8 +16,8 @@ use crate::table;
 pub struct Comparisons {
     /// On words that a column of a table never has.
     pub words: Vec<String>,
-    /// On numbers that a column equals; they matter if the answer has no rows.
-    pub numbers: Vec<String>,
+    /// Numbers that a column of a table is compared with: they may lack digits if the answer has no rows, or is a single row about none.
+    pub numbers: Vec<ComparedNumber>,
 }
 
 impl Comparisons {
@@ -28,8 +29,25 @@ impl Comparisons {
     }
 }
 
-/// Digits from which a number is probably copied from a table and rounded. Chosen: specs have fewer.
-const MIN_ROUNDED_DIGITS: usize = 5;
+/// A column of a table and the number that it is compared with.
+pub struct ComparedNumber {
+    table: String,
+    column: String,
+    number: f64,
+}
+
+impl Tables {
+    /// A note if no row has the compared number, but some row has it with more digits.
+    pub fn note_on(&self, ComparedNumber { table, column, number }: &ComparedNumber) -> Option<String> {
+        let [low, high] = if *number < 0.0 { ['+', '-'] } else { ['-', '+'] };
+        let close = format!("{column} BETWEEN {number} * (1 {low} 1e-6) AND {number} * (1 {high} 1e-6)");
+        let found = self.query(&format!("SELECT DISTINCT {column} FROM \"{table}\" WHERE {close} LIMIT 2")).ok()?;
+        let mut cells = Vec::new();
+        found.rows(|rows| Ok(cells.extend(rows.into_iter().flatten()))).ok()?;
+        let is_rounded = !cells.is_empty() && !cells.contains(&Cell::Number(*number));
+        is_rounded.then(|| format!("`=` compares all digits of `{column}`; for a rounded number, write {close}"))
+    }
+}
 
 struct Search<'a> {
     sources: Vec<&'a Source>,
@@ -46,22 +64,17 @@ impl Search<'_> {
         }
         let of_tables = self.sources.iter().filter(has).flat_map(|source| table::vocabulary(&source.name, column));
         let vocabulary: Vec<&str> = of_tables.collect();
-        match constant {
-            Expr::Value(value) => match &value.value {
-                Value::SingleQuotedString(word) if !vocabulary.is_empty() && !vocabulary.contains(&word.as_str()) => {
-                    let words = vocabulary.join(", ");
-                    self.found.words.push(format!("`{column}` is never '{word}'; it is one of {words}"));
-                }
-                Value::Number(number, _) if digits(number) >= MIN_ROUNDED_DIGITS => {
-                    let close = format!("{column} BETWEEN {number} * (1 - 1e-6) AND {number} * (1 + 1e-6)");
-                    self.found
-                        .numbers
-                        .push(format!("`=` compares all digits of `{column}`; for a rounded number, write {close}"));
-                }
-                _ => {}
-            },
-            Expr::UnaryOp { op: UnaryOperator::Minus | UnaryOperator::Plus, expr } => self.read(column, expr),
-            _ => {}
+        if let Expr::Value(ValueWithSpan { value: Value::SingleQuotedString(word), .. }) = constant
+            && !vocabulary.is_empty()
+            && !vocabulary.contains(&word.as_str())
+        {
+            let words = vocabulary.join(", ");
+            self.found.words.push(format!("`{column}` is never '{word}'; it is one of {words}"));
+        }
+        if let Some(number) = constant.to_string().parse().ok().filter(|number| *number != 0.0) {
+            let of =
+                |source: &&Source| ComparedNumber { table: source.name.clone(), column: column.to_owned(), number };
+            self.found.numbers.extend(self.sources.iter().filter(has).map(of));
         }
     }
 }
@@ -85,10 +98,4 @@ impl VisitorMut for Search<'_> {
         }
         ControlFlow::Continue(())
     }
-}
-
-/// The significant digits of a number.
-fn digits(number: &str) -> usize {
-    let mantissa = number.split(['e', 'E']).next().unwrap_or_default();
-    mantissa.trim_start_matches(['0', '.']).chars().filter(char::is_ascii_digit).count()
 }

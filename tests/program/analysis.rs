@@ -123,11 +123,14 @@ fn comparisons_with_unknown_words_or_rounded_numbers_are_noted() {
         assert_eq!(note.lines().count(), 1, "{note}");
     }
     assert_eq!(asked("t_f = 0.038", "t_f"), ("t_f\n".to_owned(), String::new()));
-    let (answer, note) = asked("t_f = 0.0370001", "t_f");
+    let (answer, note) = asked("t_f = 0.03700001", "t_f");
     assert_eq!(answer, "t_f\n");
-    let close = "t_f BETWEEN 0.0370001 * (1 - 1e-6) AND 0.0370001 * (1 + 1e-6)";
+    let close = "t_f BETWEEN 0.03700001 * (1 - 1e-6) AND 0.03700001 * (1 + 1e-6)";
     assert_eq!(note, format!("note: `=` compares all digits of `t_f`; for a rounded number, write {close}\n"));
-    assert_eq!(asked(&close.replace("0.0370001", "0.037"), "t_f"), ("t_f\n0.037\n".to_owned(), String::new()));
+    assert_eq!(asked(&close.replace("0.03700001", "0.037"), "t_f"), ("t_f\n0.037\n".to_owned(), String::new()));
+    // The same in a count; not for a number that no row has in more digits, or that a row has.
+    assert!(asked("t_f = 0.03700001", "count(*)").1.starts_with("note: `=` compares all digits of `t_f`"));
+    assert!(asked("gap = -0.03700001 OR t_f = 0.038", "count(*)").1.is_empty());
     // A name after AS has words of its own.
     let renamed = "SELECT count(*) AS n FROM (SELECT 'good' AS status FROM best_cubic) AS t WHERE status = 'good'";
     assert_eq!(printed(folder.path(), &["query", "results/test", renamed]), "n\n3\n");
