@@ -142,11 +142,11 @@ fn member(case: &Case, rtol: f64, stats: &mut SolverStats) -> Result<(FrictionPa
             let found =
                 search(path, max_growth, stats).and_then(|alpha| refine(path.with(alpha), (rtol, max_noise), stats));
             best = match (best, found) {
-                (Some(best), Some(found)) if found.step >= best.step => Some(best),
+                (Some(best), Some(found)) if found.error >= best.error => Some(best),
                 (best, found) => found.or(best),
             };
             // Where rounding leaves more, another residual may be better conditioned.
-            if let Some(Refined { path, panels, .. }) = best.take_if(|best| best.step <= 0.5 * low_noise) {
+            if let Some(Refined { path, panels, .. }) = best.take_if(|best| best.error <= 0.5 * low_noise) {
                 return Ok((path, panels));
             }
         }
@@ -198,8 +198,8 @@ fn last_pass(
 struct Refined {
     path: FrictionPath,
     panels: Vec<FrictionPanel>,
-    /// The last step of `alpha_3`, as the relative change of some velocity: what rounding leaves.
-    step: f64,
+    /// What rounding and integration leave of the error of `alpha_3`, as the relative change of some velocity.
+    error: f64,
 }
 
 /// Refines a path to the one that arrives; `None` where this fails.
@@ -219,18 +219,19 @@ fn refine(mut path: FrictionPath, (rtol, max_noise): (f64, f64), stats: &mut Sol
         // Newton's method has converged to rounding. Where neighbouring doubles differ by more, another residual may be
         // better conditioned.
         let are_neighbours = step.abs() <= f64::EPSILON * path.alpha.abs();
-        let spent = step.abs() <= 2.0 * ROUNDING_RTOL * path.rounding(&end) && step.abs() >= 0.5 * before
+        let rounding = path.rounding(&end);
+        let spent = step.abs() <= 2.0 * ROUNDING_RTOL * rounding * path.spare_rounding(&end)
+            && step.abs() >= 0.5 * before
             || are_neighbours && within(0.5 * LOW_NOISE)
             || path.alpha + step == path.alpha;
-        // Slips that add up to the spare time are known to its rounding. Theta at the end may determine alpha better. The
-        // rounding of t_f itself limits every residual.
-        let is_lost = is_last && 2.0 * ROUNDING_RTOL * path.lost_in_sum(&end) > 0.5 * rtol.max(LOW_NOISE) * scale;
-        if end.noise * f64::EPSILON > max_noise || is_lost {
+        if end.noise * f64::EPSILON > max_noise {
             return None;
         }
         if is_last && (within(0.5 * rtol) || spent) {
-            // Where this residual depends on alpha by rounding only, it fails.
-            return within(NEWTON_CHANGE).then_some(Refined { path, panels, step: step.abs() / scale });
+            // A sum that hardly depends on alpha determines it no better than its own error does.
+            let relative_error = if path.residual == Residual::LnTheta { 0.0 } else { tolerance };
+            let error = step.abs().max(f64::EPSILON.max(relative_error) * rounding) / scale;
+            return (error <= max_noise).then_some(Refined { path, panels, error });
         }
         if !step.is_finite() || is_last && are_neighbours {
             return None;

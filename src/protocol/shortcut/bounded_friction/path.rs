@@ -225,22 +225,17 @@ impl FrictionPath {
         }
     }
 
-    /// Error of `alpha_3` from rounding at the end, in units of the last position of 1.
+    /// Error of `alpha_3` from rounding at the end, in units of the last position of 1, without that of `t_f`.
     pub fn rounding(&self, end: &PassResult) -> f64 {
         if self.residual == Residual::LnTheta {
             return end.noise / end.w_by_alpha.abs();
         }
-        // One unit of the residual, and the rounding of t_f relative to the spare time.
-        (end.sum / (self.time_per_w(end.w) * end.w_by_alpha)).abs() * (1.0 + self.t_f / end.sum)
+        (end.sum / (self.time_per_w(end.w) * end.w_by_alpha)).abs()
     }
 
-    /// Error of `alpha_3` from rounding of a two-sided sum, without that of `t_f`, which affects every residual; 0 for the
-    /// other residuals.
-    pub fn lost_in_sum(&self, end: &PassResult) -> f64 {
-        match self.residual {
-            Residual::TwoSidedSlip => self.rounding(end) / (1.0 + self.t_f / end.sum),
-            _ => 0.0,
-        }
+    /// The factor of that error by the rounding of `t_f` in the spare time.
+    pub fn spare_rounding(&self, end: &PassResult) -> f64 {
+        if self.residual == Residual::LnTheta { 1.0 } else { 1.0 + self.t_f / end.sum }
     }
 
     /// `ln[(tau_M - tau)/margin]` with the margin of this end; the sum of `alpha_3` and `ln R` is exact where they cancel.
