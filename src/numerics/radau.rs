@@ -5,6 +5,7 @@
 
 use std::sync::OnceLock;
 
+use super::MIN_INVERTIBLE;
 use super::double_double::DoubleDouble;
 use super::gauss::legendre;
 
@@ -64,7 +65,7 @@ impl Radau {
     pub fn interpolate(&self, start: Option<f64>, f: &Nodes, u: f64) -> f64 {
         let (mut above, mut below) = (0.0, 0.0);
         if let Some(start) = start {
-            if u == 0.0 {
+            if u.abs() < MIN_INVERTIBLE {
                 return start;
             }
             below = self.barycentric[NODES] / u;

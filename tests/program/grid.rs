@@ -190,7 +190,7 @@ fn check(row_index: &RowIndex, expected: &[Values1], axes: &[Quantity], random: 
 fn rows_of_random_blocks_are_those_of_nested_loops() {
     let mut random = Random(1);
     let (mut with_condition, mut dropped) = (0, 0);
-    for case in 0..400 {
+    for case in 0..450 {
         let blocks: Vec<Known> = (0..1 + random.below(3) / 2).map(|_| Known::new(&mut random)).collect();
         let blocks_of = blocks.iter().map(|known| Arc::new(known.block.clone()));
         let grid = Grid { blocks: blocks_of.collect(), ..Grid::default() };

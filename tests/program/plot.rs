@@ -388,7 +388,7 @@ fn axes_that_change_together_make_lines_and_sampled_ones_dots() {
          [tables.optimal]\n",
         "optimal",
     );
-    assert!(along.contains("Along with vf, vi changes.") && !svg.contains("<image"), "{along}");
+    assert!(along.contains("Along with vi, vf changes.") && !svg.contains("<image"), "{along}");
     let (sampled, svg) = picture(
         "sampled",
         "[axes]\na = 0.03\nb = 0.05\nv_i = 3.0\nv_f = { sobol = [10.0, 1000.0, 64], seed = 1 }\n\
@@ -801,7 +801,7 @@ fn regress_no_dot_has_the_name_of_a_block_alone() {
 #[test]
 fn regress_maps_of_many_samples_are_filled() {
     let spec = format!(
-        "[axes]\n{MATERIAL}v_f = {{ sobol = [10.0, 1000.0, 150000], seed = 1 }}\nt_f = {{ sobol = [0.01, 0.1, 150000], seed = 1 }}\n\
+        "[axes]\n{MATERIAL}v_f = {{ lhs = [10.0, 1000.0, 150000], seed = 1 }}\nt_f = {{ lhs = [0.01, 0.1, 150000], seed = 1 }}\n\
          [tables.optimal]\ncolumns = [\"work\"]\n"
     );
     let (map, svg) = picture("samples", &spec, "optimal");

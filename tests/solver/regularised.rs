@@ -714,3 +714,15 @@ fn regress_an_overshoot_before_the_end_is_seen() {
     let found = regularised::solve(&slider, velocities, t_f, delta_t, true, 1e-10).value.expect("has numbers");
     assert!((found.v_max / 4204805.912167092 - 1.0).abs() < 1e-10, "{found:?}");
 }
+
+/// At the end of so long a wait `1 - theta` is subnormal, and so are slopes there.
+#[test]
+fn regress_a_wait_until_theta_is_1_has_no_negative_friction() {
+    let slider = SpringBlock { law: Law { a: 0.08, b: 0.05 }, k: f64::INFINITY, m: 0.0 };
+    for t_f in [700.0, 712.0, 715.0, 718.0, 721.0, 724.0, 727.0, 740.0] {
+        let case = Case { slider, velocities: (1.02, 1.05), t_f, bounded: true };
+        for rtol in [1e-6, 1e-10, 1e-12] {
+            assert_eq!(solve(&case, 0.001, rtol).status, Status::BelowBound, "{t_f} {rtol}");
+        }
+    }
+}

@@ -338,3 +338,31 @@ fn regress_a_fast_rise_from_a_feasible_weak_state_is_no_proof() {
         assert!(found.status == Status::Unproven && found.value.is_some(), "{found:?}");
     }
 }
+
+/// Without evolution effect the work is `t_f + [V (1 + a ln V) - 1] t_j` with the time `t_j` on the ceiling, whose derivative is elementary.
+#[test]
+fn slopes_by_the_velocity_before_keep_their_digits_without_evolution_effect() {
+    for law in LAWS {
+        for v_i in [1.0032, 1.1, 30.0] {
+            for (t_f, v_f, ceiling) in [(0.01, 176e6, 1e12), (1.0, 176e6, 1e9), (20.0, 176e6, 1e12), (7.0, 40.0, 800.0)]
+            {
+                let (a, v) = (0.0022756257569547214, transition(0.0022756257569547214, 0.0, v_i, v_f));
+                let on_ceiling = found(&(law, v, t_f, ceiling)).optimum.time_at_v_ceiling;
+                let waited = t_f - on_ceiling;
+                let by_time = if law == StateLaw::Slip {
+                    let w = -f64::ln(v_i) * (-waited).exp();
+                    -(-waited).exp() / v_i / (ceiling * (ceiling.ln() + w) - w)
+                } else {
+                    // Of (1 - theta)/(1 + theta), which decays like e^-t.
+                    let q = (v_i - 1.0) / (v_i + 1.0) * (-waited).exp();
+                    let turn = (1.0 - q) / (1.0 + q);
+                    let left = 4.0 * q / ((1.0 + q) * (1.0 + q));
+                    -2.0 * left / ((v_i - 1.0) * (v_i + 1.0) * turn * turn * (ceiling * ceiling - 1.0))
+                };
+                let expected = (ceiling * (1.0 + a * ceiling.ln()) - 1.0) * by_time;
+                let slope = slopes(law, &v, t_f, ceiling).expect("has an optimum").v_i;
+                assert!((slope / expected - 1.0).abs() < 1e-12, "{law:?} {v:?} {t_f} {ceiling}: {slope} {expected}");
+            }
+        }
+    }
+}

@@ -516,3 +516,16 @@ fn regress_a_tighter_accuracy_is_no_worse_where_a_block_nearly_stops() {
         }
     }
 }
+
+/// A long slide close to steady states: the time lost hardly depends on `alpha_3`, theta at the end does. By collocation with 80 bits.
+#[test]
+fn regress_a_sum_that_hardly_depends_on_alpha_does_not_determine_it() {
+    let law = Law { a: 0.0020042931191504576, b: 0.0014182778377131453 };
+    let case = case(law, 42.77668643753129, 1793170878.289351, 0.0006472650162062959, 1.036450087797746);
+    for rtol in [1e-6, 1e-10, 1e-12, 1e-13] {
+        let found = solve(&case, rtol).expect("exists");
+        let alpha = found.alpha.expect("has one");
+        assert!(relative(alpha, -0.3571192837457) < 1e-9, "{rtol}: {found:?}");
+        assert!(relative(found.work, 121883.917766) < 1e-10, "{rtol}: {found:?}");
+    }
+}

@@ -873,3 +873,26 @@ fn regress_a_response_that_is_proved_to_settle_is_settled() {
         assert!(found.outcome == outcome && !has_numbers, "{state_law:?}: {found:?}");
     }
 }
+
+/// Without evolution effect and mass the velocity is logistic, whatever the law of the state.
+#[test]
+fn regress_a_logistic_response_has_all_its_numbers() {
+    let (a, k, v_f) = (0.015, 1.5, 100.0);
+    for state_law in [StateLaw::Ageing, StateLaw::Slip, StateLaw::Prz] {
+        for v_i in [1e-3, 50.0, 150.0, 1000.0, 1e7] {
+            let step =
+                VelocityStep { state_law, transition: Transition { law: Law { a, b: 0.0 }, v_i, v_f }, k, m: 0.0 };
+            for rtol in [1e-3, 1e-6, 1e-10] {
+                let found = respond(&step, rtol);
+                let edge = if v_i > v_f { 1.01 } else { 0.99 };
+                let settling = a / (k * v_f) * ((v_f / v_i - 1.0) / (1.0 / edge - 1.0)).ln();
+                assert_eq!(found.outcome, Outcome::Settled, "{state_law:?} {v_i} {rtol}: {found:?}");
+                let numbers =
+                    [(found.v_peak, v_f), (found.v_trough, v_f), (found.settling_time.unwrap_or(0.0), settling)];
+                for (number, expected) in numbers {
+                    assert!(relative(number, expected) <= rtol, "{state_law:?} {v_i} {rtol}: {found:?} {settling}");
+                }
+            }
+        }
+    }
+}

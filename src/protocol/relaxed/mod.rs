@@ -395,7 +395,7 @@ fn on_bounds(problem: &Problem, arcs: &[BoundArc; 2], chatter: f64, t_f: f64) ->
     if chatter == 0.0 {
         return (Relaxed { optimum, chatter: None }, least);
     }
-    let duty = problem.duty(&turn);
+    let [_, duty] = problem.duties(&turn);
     // Both bounds occur at the state of chattering.
     let pulses = [Kind::Wait, Kind::Jerk].map(|kind| BoundArc { kind, length: 1.0, ends: [turn; 2], span: 0.0 });
     let there = bound_arc::friction(&pulses, problem);

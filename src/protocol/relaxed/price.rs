@@ -45,10 +45,16 @@ impl Problem {
         [direct, -state.below_floor * slow, by_ceiling]
     }
 
-    /// Fraction of the time on the ceiling that holds theta at `state`.
-    pub(super) fn duty(&self, state: &State) -> f64 {
+    /// Fractions of the time at `v = 1` and on the ceiling that hold theta at `state`.
+    pub(super) fn duties(&self, state: &State) -> [f64; 2] {
+        let ceiling = self.ceiling;
+        if self.law == StateLaw::Slip {
+            let under = ceiling * state.above_ceiling + state.below_floor;
+            return [ceiling * state.above_ceiling, state.below_floor].map(|part| part / under);
+        }
         let beyond = (state.v - 1.0) * (state.v + 1.0);
-        beyond / ((self.ceiling - 1.0) * (self.ceiling + 1.0))
+        let below = state.v * state.v * state.excess * (state.excess + 2.0);
+        [below, beyond].map(|part| part / ((ceiling - 1.0) * (ceiling + 1.0)))
     }
 
     /// `R`, for which the price of the law of Perrin, Rice and Zheng is stationary where `s - ln s = R` with `theta^2 = s/V`.

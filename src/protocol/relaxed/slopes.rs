@@ -21,7 +21,7 @@ pub(super) fn of_path(path: &Path, problem: &Problem, hamiltonian: f64) -> Slope
     let [start, end] =
         [(&arcs[0], &arcs[1], &problem.from), (&arcs[1], &arcs[0], &problem.to)].map(|(arc, other, state)| {
             let kind = if arc.length > 0.0 || other.length == 0.0 { arc.kind } else { other.kind };
-            problem.by_velocity(state, kind, hamiltonian)
+            problem.by_velocity(state, kind, &arcs[0].ends[1], arc.span)
         });
     let on_ceiling = by_ceiling(&arcs[0], 1, problem, hamiltonian) + by_ceiling(&arcs[1], 0, problem, hamiltonian);
     Slopes {
@@ -107,19 +107,24 @@ impl Problem {
         }
     }
 
-    /// The costate `(H - tau v)/theta'` at `state` by the velocity of its steady sliding: over `v^2`.
-    fn by_velocity(&self, state: &State, kind: Kind, hamiltonian: f64) -> f64 {
-        let (direct, speed) = match kind {
-            Kind::Wait => (0.0, 1.0),
-            Kind::Jerk => (self.a * self.ln_ceiling, self.ceiling),
+    /// The costate `(H - tau v)/theta'` at `state`, the distance `span` of theta from the `turn`, by the velocity of its steady sliding: over `v^2`.
+    ///
+    /// `H` is the mean of `tau v` on both bounds that holds theta at the turn, so that `H - tau v` there is a fraction of their difference.
+    fn by_velocity(&self, state: &State, kind: Kind, turn: &State, span: f64) -> f64 {
+        let Problem { a, b, ceiling, ln_ceiling, .. } = *self;
+        let [at_floor, on_ceiling] = self.duties(turn);
+        let dearer = (1.0 - b * turn.below_floor) * (ceiling - 1.0) + a * ceiling * ln_ceiling;
+        let (saved, speed) = match kind {
+            Kind::Wait => (on_ceiling * dearer, 1.0),
+            Kind::Jerk => (-at_floor * dearer, ceiling),
         };
-        let power = (1.0 + (direct - self.b * state.below_floor)) * speed;
+        let growth = ln_1p(span / turn.theta.min(state.theta)).copysign(turn.theta - state.theta);
         let rate = match (self.law, kind) {
             (StateLaw::Slip, Kind::Wait) => state.theta * state.below_floor,
             (StateLaw::Slip, Kind::Jerk) => -(1.0 + state.excess) * state.above_ceiling,
             (_, Kind::Wait) => 0.5 * (state.v - 1.0) * (state.v + 1.0) * state.theta * state.theta,
             (_, Kind::Jerk) => -0.5 * state.excess * (state.excess + 2.0),
         };
-        (hamiltonian - power) / rate * state.theta * state.theta
+        (saved + b * speed * growth) / rate * state.theta * state.theta
     }
 }

@@ -171,9 +171,7 @@ impl<'a> Orbit<'a> {
         let ScaledBlock { a, b, inertia, k, .. } = *self.slider;
         // Friction converts ln theta to ln v by b/a, and the energy of a soft spring moves masses of M and a.
         let force = a.min((k * (inertia + a)).sqrt());
-        x.abs() < self.rest_distance
-            && y.abs() * a.max(b) < self.rest_distance * a
-            && z.abs() < self.rest_distance * force
+        x.abs() < self.rest_distance && y.abs() * b < self.rest_distance * a && z.abs() < self.rest_distance * force
     }
 
     /// Finds extrema and crossings within a step, from node to node.
