@@ -341,7 +341,7 @@ impl Path {
         let (mut ends, mut has) = (0.0, [false; 2]);
         for piece in self.pieces() {
             let ClampedPiece::Free { arc, turned, at, .. } = piece else { continue };
-            sums.add(&arc.sums::<false>(tolerance)?);
+            sums.add(&arc.sums(tolerance)?);
             ends += turned;
             has = [has[0] || at[0], has[1] || at[1]];
         }

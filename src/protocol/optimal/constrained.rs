@@ -204,7 +204,7 @@ fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stat
     let (mut status, mut optimum) = search::without_arcs(problem, v, 0.0, -friction * v, [friction, friction]);
     if problem.rises() {
         let tolerance = search::quadrature_tolerance(rtol);
-        let turn = problem.extremal(0.0, None).and_then(|turn| Some((turn, turn.arc.sums::<false>(tolerance)?)));
+        let turn = problem.extremal(0.0, None).and_then(|turn| Some((turn, turn.arc.sums(tolerance)?)));
         let read = turn.and_then(|(turn, sums)| {
             stats += SolverStats { quadratures: 1, nodes: sums.nodes };
             sat = (sat - turn.time(&sums)).max(0.0);

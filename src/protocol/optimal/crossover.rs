@@ -101,7 +101,7 @@ impl Quadratures {
 
     /// Time and work of an extremal that exists.
     fn measure(&mut self, extremal: Option<Extremal>) -> (Option<f64>, Option<f64>) {
-        let sums = extremal.as_ref().and_then(|e| e.arc.sums::<false>(quadrature_tolerance(self.rtol)));
+        let sums = extremal.as_ref().and_then(|e| e.arc.sums(quadrature_tolerance(self.rtol)));
         let (Some(extremal), Some(sums)) = (extremal, sums) else {
             // Where friction fails already in a steady state, no arc need exist.
             let failed = if self.problem.is_doubtful() { Status::Unproven } else { Status::NotConverged };

@@ -409,7 +409,7 @@ impl Family for Extremals<'_> {
     }
 
     fn measure(&self, path: &Extremal, tolerance: f64) -> Option<Measured> {
-        let sums = path.arc.sums::<false>(tolerance)?;
+        let sums = path.arc.sums(tolerance)?;
         let Sums { work, friction_min, nodes, .. } = sums;
         let probe = path.probe(self.problem, &sums, self.beyond);
         Some(Measured { lag: self.beyond - path.time_beyond(&sums), work, friction_min, nodes, probe })
