@@ -1,6 +1,6 @@
 //! The times at which the optimal strategy changes: closed forms, one quadrature each.
 
-use super::clamp::PathView;
+use super::clamp::Path;
 use super::extremal::{Extremal, Problem};
 use super::floor;
 use super::search::{is_proven, quadrature_tolerance};
@@ -111,7 +111,7 @@ impl Quadratures {
         self.stats.quadratures += 1;
         self.stats.nodes += sums.nodes;
         let problem = self.problem;
-        let least = PathView::of_free(&problem, &extremal).friction(&problem, sums.friction_min).least;
+        let least = Path::of(&problem, extremal).friction(&problem, sums.friction_min).least;
         self.meet(least, || is_proven(&problem, &extremal));
         (Some(extremal.time(&sums)), Some(extremal.work(&self.problem, &sums)))
     }
