@@ -17,7 +17,7 @@ use crate::numerics::elementary::{exp, exp_m1, ln, ln_1p, ln_grown, phi, rough_l
 use crate::numerics::gauss::{Rule, SHORT_NODES, rule};
 use crate::numerics::lanes::{LANES, Lanes, fold, least};
 use crate::numerics::turning::{Turning, turning, turning_lanes};
-use crate::numerics::{self, MAX_SQUARABLE};
+use crate::numerics::{self, MAX_SQUARABLE, ROUNDING_RTOL};
 
 /// The chart that an arc is drawn in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,9 +66,9 @@ pub(super) struct Sums {
     pub lag: f64,
     /// Work of friction along it.
     pub work: f64,
-    /// `int v ln v dt`, with `SLOPES`; else 0.
+    /// `int v ln v dt`.
     pub creep: f64,
-    /// `int v ln theta dt`, with `SLOPES`; else 0.
+    /// `int v ln theta dt`.
     pub state: f64,
     /// The interior part of `d time/d ln theta_h` in the turning chart; 0 in the direct chart.
     pub sensitivity: f64,
@@ -204,12 +204,11 @@ impl Arc {
         w.is_finite().then(|| turning(w))
     }
 
-    /// Time, work and sensitivity to relative accuracy `tolerance`, with `SLOPES` also the sums for the derivatives of the work;
-    /// `None` where the arc does not exist (`E < 0` on the way).
-    pub fn sums<const SLOPES: bool>(&self, tolerance: f64) -> Option<Sums> {
+    /// The quadrature to relative accuracy `tolerance`; `None` where the arc does not exist (`E < 0` on the way).
+    pub fn sums(&self, tolerance: f64) -> Option<Sums> {
         let (line, slice) = self.line();
         let steep = self.law.b - self.law.a;
-        let sums = line.sums(tolerance, steep, |middle, half, rule| slice.sums::<SLOPES>(middle, half, rule));
+        let sums = line.sums(tolerance, steep, |middle, half, rule| slice.sums(middle, half, rule));
         (sums.time.is_finite() && sums.work.is_finite()).then_some(sums)
     }
 
@@ -241,8 +240,8 @@ impl Arc {
         } else {
             asinh(s_end, r_end) - start
         };
-        // Where theta rises, the branch points of U; where it falls, U has none.
-        let (re, im) = if sigma < 1.0 { BRANCH } else { asinh_diagonal(2.0 * std::f64::consts::PI.sqrt() * layer) };
+        // Where theta rises, the branch points of U, in a wide layer farther away; where it falls, U has none.
+        let (re, im) = BRANCH;
         // Where theta is infinite, X = i; for C > 0 E has another zero above theta_h, at |X| > sqrt(1 - kappa).
         let kappa = if c_h < 0.0 && a > b { -c_h / (a - b) } else { 0.0 };
         let nearest = (1.0 - kappa).max(0.0).sqrt();
@@ -291,7 +290,7 @@ impl Arc {
             let (finer, _) = pieces.whole();
             let change = (finer - time).abs();
             time = finer;
-            if change <= 10.0 * PIECE_TOLERANCE * time {
+            if change <= AGREEMENT * time {
                 break;
             }
         }
@@ -310,20 +309,14 @@ struct Line {
 impl Line {
     /// The number of pieces with few nodes.
     fn pieces(&self) -> u32 {
-        self.cut(SHORT_NODES as f64, MAX_PIECES, PIECE_TOLERANCE).0
+        self.cut(SHORT_NODES as f64, ROUNDING_RTOL).0
     }
 
-    /// Into how many equal panels, up to `most_panels`, to cut so that none needs more than `most` nodes, and how many
-    /// nodes they need.
+    /// Into how many equal panels to cut so that none needs more than `most` nodes, and how many nodes they need.
     #[inline(always)]
-    fn cut(&self, most: f64, most_panels: u32, tolerance: f64) -> (u32, f64) {
+    fn cut(&self, most: f64, tolerance: f64) -> (u32, f64) {
         let digits = -rough_ln(tolerance);
-        let half = 0.5 * self.length.abs();
-        let needed = nodes_needed(self.start + 0.5 * self.length, half, &self.singular, digits);
-        if needed <= most || most_panels == 1 {
-            return (1, needed.min(most));
-        }
-        let mut count = 2u32;
+        let mut count = 1u32;
         loop {
             let half = 0.5 * self.length.abs() / f64::from(count);
             let mut needed = 0.0f64;
@@ -331,7 +324,7 @@ impl Line {
                 let middle = self.start + self.length * (f64::from(panel) + 0.5) / f64::from(count);
                 needed = needed.max(nodes_needed(middle, half, &self.singular, digits));
             }
-            if needed <= most || count >= most_panels {
+            if needed <= most || count >= MAX_PIECES {
                 return (count, needed.min(most));
             }
             count *= 2;
@@ -341,7 +334,7 @@ impl Line {
     /// Sums over equal panels, with as many Gauss nodes as the nearest singularity needs; where friction falls to `steep`, `b - a`, over
     /// halved panels instead: there a zero of `E` may be close to an end.
     fn sums(&self, tolerance: f64, steep: f64, kernel: impl Fn(f64, f64, &Rule) -> Sums) -> Sums {
-        let (count, nodes) = self.cut(MAX_NODES, MAX_PANELS, tolerance);
+        let (count, nodes) = self.cut(MAX_NODES, tolerance);
         let rule = rule(LANES * (nodes as usize / LANES + 1));
         let half = 0.5 * self.length / f64::from(count);
         let mut total = Sums::default();
@@ -392,10 +385,10 @@ enum Slice {
 impl Slice {
     /// The sums of one panel.
     #[inline(always)]
-    fn sums<const SLOPES: bool>(&self, middle: f64, half: f64, rule: &Rule) -> Sums {
+    fn sums(&self, middle: f64, half: f64, rule: &Rule) -> Sums {
         match self {
-            Slice::Turning(slice) => panel_sums::<_, SLOPES>(slice, middle, half, rule),
-            Slice::Direct(slice) => panel_sums::<_, SLOPES>(slice, middle, half, rule),
+            Slice::Turning(slice) => panel_sums(slice, &slice.law, middle, half, rule),
+            Slice::Direct(slice) => panel_sums(slice, &slice.law, middle, half, rule),
         }
     }
 }
@@ -415,11 +408,8 @@ impl ArcPoint {
     }
 }
 
-/// Most pieces of an arc. Chosen: a limit on the work; doubling ends there.
+/// Most panels or pieces of an arc. Chosen: a limit on the work; doubling ends there.
 const MAX_PIECES: u32 = 1024;
-
-/// Relative accuracy of the time within a piece. Chosen: a few roundings.
-const PIECE_TOLERANCE: f64 = 1e-15;
 
 impl EqualSteps {
     /// The places at both ends of a piece; places run from 0 at the start of the arc to 1 at its end.
@@ -446,7 +436,7 @@ impl EqualSteps {
     /// The sums of the arc from one place to another of the same piece.
     pub fn sums(&self, from: f64, to: f64) -> Sums {
         let (middle, half) = (self.start + 0.5 * (from + to) * self.length, 0.5 * (to - from) * self.length);
-        self.slice.sums::<false>(middle, half, rule(SHORT_NODES))
+        self.slice.sums(middle, half, rule(SHORT_NODES))
     }
 
     /// The point at `place`.
@@ -473,14 +463,11 @@ impl EqualSteps {
 /// Layers of the turning point to one unit of `sinh p`. Chosen: it balances the two kinds of singularity in the `p` plane.
 const LAYERS: f64 = 1.5;
 
-/// The branch points of `U` in the `p` plane, `asinh(2 sqrt(pi)/LAYERS e^(i pi/4))`.
+/// The branch points of `U` in the `p` plane, `asinh(2 sqrt(pi)/LAYERS e^(i pi/4))`, where the layer is narrow.
 const BRANCH: (f64, f64) = (1.556165173207204, 0.7409303559311022);
 
 /// Nodes beyond which a panel is divided in two. Chosen: halves need about half the nodes each; the budgets of `optimal` judge the error.
 const MAX_NODES: f64 = 64.0;
-
-/// Most panels of an arc. Chosen: a limit on the work; 64 panels of 64 nodes.
-const MAX_PANELS: u32 = 64;
 
 /// Relative difference of two rules that is rounding. Chosen: a hundred roundings.
 const AGREEMENT: f64 = 1e-14;
@@ -528,7 +515,7 @@ fn zero_above(law: &Law, friction_a: f64, c: f64, shift: f64) -> (f64, f64) {
     (r, s)
 }
 
-/// Rounds of [`zero_above`] and [`last_zero`]. Chosen: the number of nodes needs one digit of the distance.
+/// Rounds of [`zero_above`]. Chosen: the number of nodes needs one digit of the distance.
 const ROUNDS: u32 = 2;
 
 /// A bound from above of the zero of `a E` below the arc in the direct chart, which reaches down to `low`; `slope` is `b
@@ -538,9 +525,6 @@ fn zero_below(slope: f64, friction_a: f64, c: f64, low: f64) -> f64 {
         return -NO_SINGULARITY;
     }
     let friction = friction_a + slope * low;
-    if friction > HIGH * slope {
-        return low - NEAREST_HIGH;
-    }
     // Below the arc a E is no steeper than there for C > 0, and than b - a for C < 0.
     let pull = c * exp(low);
     let steepest = (friction + pull) / (slope + pull.max(0.0));
@@ -557,17 +541,14 @@ fn last_zero(slope: f64, c_h: f64, grow: f64) -> Option<f64> {
         return None;
     }
     // Newton's method comes down to it from the right: x < k, and x < 2 (k - 1) since x/(1 - e^-x) > 1 + x/2.
-    let mut x = k.min(2.0 * (k - 1.0)).max(CLOSEST);
-    for _ in 0..ROUNDS {
-        let rest = exp(-x);
-        x -= (x - k * (1.0 - rest)) / (1.0 - k * rest);
-    }
+    let above = k.min(2.0 * (k - 1.0)).max(CLOSEST);
+    let rest = exp(-above);
+    let x = above - (above - k * (1.0 - rest)) / (1.0 - k * rest);
     Some(exp_m1(x.max(rough_ln(grow) + CLOSEST)).sqrt())
 }
 
-/// Friction in units of `b - a` above which the zero of `E` below an arc is far from it, and how far at least. Chosen: one digit of the distance.
+/// Friction in units of `b - a` above which the zero of `E` below an arc is far from it. Chosen: one digit of the distance.
 const HIGH: f64 = 4.0;
-const NEAREST_HIGH: f64 = 1.6;
 
 /// Zeros closer than this come with friction below `b - a`, where quadratures are refined until two agree. Chosen: there, the estimate requires the
 /// most nodes.
@@ -582,18 +563,6 @@ fn asinh(x: f64, root: f64) -> f64 {
     let t = x.abs();
     // e^asinh t = t + root is the reciprocal of root - t.
     ln_grown(t + t * t / (1.0 + root), root - t).copysign(x)
-}
-
-/// `asinh(m e^{i pi/4})` as `(real, imaginary)`.
-fn asinh_diagonal(m: f64) -> (f64, f64) {
-    // sinh(x + iy) = sinh x cos y + i cosh x sin y with equal parts q = m/sqrt 2: sinh^2 x solves s^2 + s (1 - 2 q^2) -
-    // q^2 = 0.
-    let q2 = 0.5 * m * m;
-    let h = 0.5 - q2;
-    let root = (h * h + q2).sqrt();
-    let s = if h > 0.0 { q2 / (root + h) } else { root - h };
-    let sin_y = (q2 / (1.0 + s)).sqrt().min(1.0);
-    (asinh(s.sqrt(), (1.0 + s).sqrt()), libm::asin(sin_y))
 }
 
 /// `acosh(1/sigma)` for `0 < sigma <= 1`, to the digits of [`rough_ln`].
@@ -641,58 +610,31 @@ impl<const N: usize> Terms<N> {
 
 /// The integrands of a chart.
 trait Integrands {
-    fn law(&self) -> Law;
-
     /// Units of time, work, sensitivity and swing per half panel.
     fn units(&self) -> [f64; 4];
 
     fn at<const N: usize>(&self, middle: f64, half: f64, x: &[f64; N], weight: &[f64; N]) -> Terms<N>;
 }
 
-/// The sums of a kernel lane by lane.
-struct Tally {
-    time: Lanes,
-    lag: Lanes,
-    work: Lanes,
-    /// Those of `creep` and `state`.
-    slopes: [Lanes; 2],
-    sensitivity: Lanes,
-    swing: Lanes,
-    friction_min: Lanes,
-}
+/// The sums of a kernel lane by lane: time, lag, work, creep, state, sensitivity and swing, and the least friction.
+struct Tally([Lanes; 7], Lanes);
 
 impl Tally {
     #[inline(always)]
-    fn new() -> Tally {
-        let zero = [0.0; LANES];
-        Tally {
-            time: zero,
-            lag: zero,
-            work: zero,
-            slopes: [zero; 2],
-            sensitivity: zero,
-            swing: zero,
-            friction_min: [f64::INFINITY; LANES],
-        }
-    }
-
-    #[inline(always)]
-    fn add<const N: usize, const SLOPES: bool>(&mut self, law: &Law, terms: &Terms<N>) {
+    fn add<const N: usize>(&mut self, law: &Law, terms: &Terms<N>) {
+        let Tally([time, lag, work, creep, state, sensitivity, swing], friction_min) = self;
         for first in (0..N).step_by(LANES) {
             for i in 0..LANES {
                 let at = first + i;
                 let friction = 1.0 + law.a * terms.ln_u[at] + (law.b - law.a) * terms.ln_theta[at];
-                self.time[i] += terms.time[at];
-                self.lag[i] += terms.time[at] * terms.u[at];
-                self.work[i] += terms.slip[at] * friction;
-                if SLOPES {
-                    self.slopes[0][i] += terms.slip[at] * (terms.ln_u[at] - terms.ln_theta[at]);
-                    self.slopes[1][i] += terms.slip[at] * terms.ln_theta[at];
-                }
-                self.sensitivity[i] += terms.sensitivity[at];
-                self.swing[i] += terms.swing[at];
-                let least = self.friction_min[i];
-                self.friction_min[i] = if friction < least { friction } else { least };
+                time[i] += terms.time[at];
+                lag[i] += terms.time[at] * terms.u[at];
+                work[i] += terms.slip[at] * friction;
+                creep[i] += terms.slip[at] * (terms.ln_u[at] - terms.ln_theta[at]);
+                state[i] += terms.slip[at] * terms.ln_theta[at];
+                sensitivity[i] += terms.sensitivity[at];
+                swing[i] += terms.swing[at];
+                friction_min[i] = if friction < friction_min[i] { friction } else { friction_min[i] };
             }
         }
     }
@@ -702,27 +644,27 @@ impl Tally {
     "x86_64+avx+avx2+bmi1+bmi2+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx+avx2+bmi1+bmi2"
 ))]
-fn panel_sums<I: Integrands, const SLOPES: bool>(integrands: &I, middle: f64, half: f64, rule: &Rule) -> Sums {
-    let mut tally = Tally::new();
-    let law = integrands.law();
+fn panel_sums<I: Integrands>(integrands: &I, law: &Law, middle: f64, half: f64, rule: &Rule) -> Sums {
+    let mut tally = Tally([[0.0; LANES]; 7], [f64::INFINITY; LANES]);
     let (x, x_last) = rule.x.as_chunks::<WIDE>();
     let (weight, weight_last) = rule.w.as_chunks::<WIDE>();
     for (x, weight) in x.iter().zip(weight) {
-        tally.add::<_, SLOPES>(&law, &integrands.at(middle, half, x, weight));
+        tally.add(law, &integrands.at(middle, half, x, weight));
     }
     for (x, weight) in x_last.as_chunks::<LANES>().0.iter().zip(weight_last.as_chunks::<LANES>().0) {
-        tally.add::<_, SLOPES>(&law, &integrands.at(middle, half, x, weight));
+        tally.add(law, &integrands.at(middle, half, x, weight));
     }
-    let [time, work, sensitivity, swing] = integrands.units().map(|unit| unit * half);
+    let [of_time, of_work, of_sensitivity, of_swing] = integrands.units().map(|unit| unit * half);
+    let [time, lag, work, creep, state, sensitivity, swing] = tally.0.map(|lanes| fold(&lanes));
     Sums {
-        time: time * fold(&tally.time),
-        lag: time * fold(&tally.lag),
-        work: work * fold(&tally.work),
-        creep: if SLOPES { work * fold(&tally.slopes[0]) } else { 0.0 },
-        state: if SLOPES { work * fold(&tally.slopes[1]) } else { 0.0 },
-        sensitivity: sensitivity * fold(&tally.sensitivity),
-        swing: swing * fold(&tally.swing),
-        friction_min: least(&tally.friction_min),
+        time: of_time * time,
+        lag: of_time * lag,
+        work: of_work * work,
+        creep: of_work * creep,
+        state: of_work * state,
+        sensitivity: of_sensitivity * sensitivity,
+        swing: of_swing * swing,
+        friction_min: least(&tally.1),
         nodes: rule.x.len() as u32,
     }
 }
@@ -737,11 +679,6 @@ struct TurningSlice {
 }
 
 impl Integrands for TurningSlice {
-    #[inline(always)]
-    fn law(&self) -> Law {
-        self.law
-    }
-
     #[inline(always)]
     fn units(&self) -> [f64; 4] {
         let (unit, theta) = (2.0 * self.sigma, self.theta_h);
@@ -796,11 +733,6 @@ struct DirectSlice {
 }
 
 impl Integrands for DirectSlice {
-    #[inline(always)]
-    fn law(&self) -> Law {
-        self.law
-    }
-
     #[inline(always)]
     fn units(&self) -> [f64; 4] {
         let theta = self.theta_a;

@@ -205,7 +205,7 @@ impl CeilingArc {
         let of_v = self.kind == ArcKind::VCeiling;
         let line = CeilingLine::of(self);
         for chart in line.charts(self) {
-            chart.nodes(|at, weight| {
+            let mut add = |at: f64, weight: f64| {
                 let (s, size, scale) = line.place(chart.near, at);
                 let (near, far) = (s, self.length - s);
                 let (below, above) = if line.high_first { (near, far) } else { (far, near) };
@@ -223,6 +223,9 @@ impl CeilingArc {
                 sums.price += price;
                 sums.price_ln_v += price * ln_v;
                 sums.price_ln_theta += price * ln_theta;
+            };
+            chart.panels(|middle, half, rule| {
+                rule.x.iter().zip(&rule.w).for_each(|(x, w)| add(middle + half * x, half * w));
             });
         }
         let lingered = line.lingered;
@@ -440,15 +443,6 @@ impl CeilingChart {
         for i in 0..count as u32 {
             panel(self.from + half * f64::from(2 * i + 1), half, rule);
         }
-    }
-
-    /// Nodes and weights.
-    fn nodes(&self, mut node: impl FnMut(f64, f64)) {
-        self.panels(|middle, half, rule| {
-            for (x, w) in rule.x.iter().zip(&rule.w) {
-                node(middle + half * x, half * w);
-            }
-        });
     }
 }
 

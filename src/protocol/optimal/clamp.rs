@@ -341,50 +341,13 @@ impl Path {
         let (mut ends, mut has) = (0.0, [false; 2]);
         for piece in self.pieces() {
             let ClampedPiece::Free { arc, turned, at, .. } = piece else { continue };
-            sums.add(&arc.sums::<false>(tolerance)?);
+            sums.add(&arc.sums(tolerance)?);
             ends += turned;
             has = [has[0] || at[0], has[1] || at[1]];
         }
         sums.time += self.times.0 + self.times.1;
         let rate = self.rate.unwrap_or_else(|| self.extremal.rate_of(&sums, ends, has));
         (sums.time.is_finite() && sums.work.is_finite()).then_some((sums, rate))
-    }
-
-    /// The path for reading.
-    pub fn view(&self) -> PathView<'_> {
-        PathView { extremal: &self.extremal, whole: None, pieces: &self.pieces, times: self.times }
-    }
-}
-
-/// A path for reading: a free extremal needs no room for five pieces.
-pub(super) struct PathView<'a> {
-    pub extremal: &'a Extremal,
-    /// A free extremal as one piece.
-    whole: Option<ClampedPiece>,
-    /// The pieces of a clamped one.
-    pieces: &'a [Option<ClampedPiece>],
-    /// Times on the ceilings of the velocity and of friction.
-    pub times: (f64, f64),
-}
-
-/// Friction along a path.
-pub(super) struct FrictionRange {
-    pub least: f64,
-    /// The least, with that of steady sliding on the ceiling of friction.
-    pub least_steady: f64,
-    pub greatest: f64,
-}
-
-impl<'a> PathView<'a> {
-    /// A free extremal.
-    #[inline(always)]
-    pub fn of_free(problem: &Problem, extremal: &'a Extremal) -> PathView<'a> {
-        PathView { extremal, whole: Some(whole(problem, extremal)), pieces: &[], times: (0.0, 0.0) }
-    }
-
-    /// The pieces in their order.
-    pub fn pieces(&self) -> impl Iterator<Item = &ClampedPiece> {
-        self.whole.iter().chain(self.pieces.iter().flatten())
     }
 
     /// Work at the floor and on the ceilings, and the nodes that it takes.
@@ -401,7 +364,6 @@ impl<'a> PathView<'a> {
     }
 
     /// Friction along the pieces and at the floor; `met` is the least at nodes.
-    #[inline(always)]
     pub fn friction(&self, problem: &Problem, met: f64) -> FrictionRange {
         let (law, c) = (&problem.law, self.extremal.arc.c());
         let waits = self.extremal.time_at_floor > 0.0;
@@ -424,6 +386,14 @@ impl<'a> PathView<'a> {
         range.least_steady = range.least_steady.min(range.least);
         range
     }
+}
+
+/// Friction along a path.
+pub(super) struct FrictionRange {
+    pub least: f64,
+    /// The least, with that of steady sliding on the ceiling of friction.
+    pub least_steady: f64,
+    pub greatest: f64,
 }
 
 impl ClampedPiece {

@@ -3,9 +3,9 @@
 
 use super::arc::Sums;
 use super::ceiling::Ceilings;
-use super::clamp::{Path, PathView, Switch, Switches, falling_part};
+use super::clamp::{Path, Switch, Switches, falling_part};
 use super::extremal::Problem;
-use super::guess::{Guess, QUADRATURE_ERROR, UNKNOWN_TIME_ERROR, capped_guess};
+use super::guess::{Guess, QUADRATURE_ERROR};
 use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum};
@@ -154,7 +154,7 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
             }
             let p = member.map_or(f64::NAN, |(_, p)| p);
             let search = Search { problem, ceilings, t_f, least, most, rtol, stats };
-            search.solve(Guess { p, error: UNKNOWN_TIME_ERROR, ..guess })
+            search.solve(guess.q_floor, p)
         }
         Feasible::Sitting(_) => sitting(problem, ceilings, t_f, rtol, stats),
         _ => Constrained::without_numbers(Status::Infeasible, stats),
@@ -163,11 +163,11 @@ pub(super) fn find(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64
 
 /// The optimum where a ceiling certainly binds, without the free one; `None` where that is not known from the first parameter.
 fn find_bound(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64, guess: &Guess) -> Option<Constrained> {
-    let &Guess { q_floor, p, error } = guess;
-    let (t_f, depth, origin) = (time.whole, problem.depth(), q_floor.unwrap_or(0.0));
+    let &Guess { q_floor, p, .. } = guess;
+    let (t_f, depth) = (time.whole, problem.depth());
     // Friction is so high all along every path that the free optimum is proven: where v >= 1, or where u > 1.
     let at_floor = 1.0 + problem.law.b * problem.from.ln.min(problem.to.ln);
-    let at_once = problem.fall > 0.0 && p + origin > 0.0;
+    let at_once = problem.fall > 0.0 && p + q_floor.unwrap_or(0.0) > 0.0;
     let proven = problem.bounded && at_floor > problem.unique_above() || at_once && !problem.is_doubtful();
     if !proven || ceilings.cap(0.0).min(ceilings.cap(depth)) <= 0.0 {
         return None;
@@ -180,21 +180,11 @@ fn find_bound(problem: &Problem, ceilings: &Ceilings, time: Time, rtol: f64, gue
     if t_f < least || t_f > most {
         return None;
     }
-    let mut start = Guess { p, q_floor, error: UNKNOWN_TIME_ERROR };
-    if at_once && error <= QUADRATURE_ERROR {
-        let z = [p + origin, all_on_ceilings(problem, ceilings)];
-        if let Some(z_0) = capped_guess(problem, ceilings, [t_f, least], z) {
-            start = Guess { p: z_0 - origin, q_floor, error: CAPPED_ERROR };
-        }
-    }
     let search = Search { problem, ceilings, t_f, least, most, rtol, stats: SolverStats::default() };
-    let found = search.solve(start);
+    let found = search.solve(q_floor, p);
     let binds = found.solved.value.is_some_and(|found| found.time_at_v_ceiling + found.time_at_tau_ceiling > 0.0);
     binds.then_some(found)
 }
-
-/// Usual error of a first parameter under ceilings. Measured: it decides only the tolerance of the first quadrature (`cargo bench --bench optimal`).
-const CAPPED_ERROR: f64 = 1e-2;
 
 /// The optimum of the time of the turn, then steady sliding.
 fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stats: SolverStats) -> Constrained {
@@ -204,12 +194,12 @@ fn sitting(problem: &Problem, ceilings: &Ceilings, t_f: f64, rtol: f64, mut stat
     let (mut status, mut optimum) = search::without_arcs(problem, v, 0.0, -friction * v, [friction, friction]);
     if problem.rises() {
         let tolerance = search::quadrature_tolerance(rtol);
-        let turn = problem.extremal(0.0, None).and_then(|turn| Some((turn, turn.arc.sums::<false>(tolerance)?)));
+        let turn = problem.extremal(0.0, None).and_then(|turn| Some((turn, turn.arc.sums(tolerance)?)));
         let read = turn.and_then(|(turn, sums)| {
             stats += SolverStats { quadratures: 1, nodes: sums.nodes };
             sat = (sat - turn.time(&sums)).max(0.0);
             let turn = path.insert(Path::of(problem, turn));
-            search::read(problem, ceilings, &turn.view(), turn.extremal.work(problem, &sums), sums.friction_min)
+            search::read(problem, ceilings, turn, turn.extremal.work(problem, &sums), sums.friction_min)
         });
         let failure = || (search::failure(problem, ceilings, f64::INFINITY), None);
         let (of_turn, value) = read.unwrap_or_else(failure);
@@ -308,14 +298,14 @@ impl<M: Fn(f64) -> Option<Path>> Family for ClampedPaths<'_, M> {
         false
     }
 
-    fn view<'p>(&self, path: &'p Path) -> PathView<'p> {
-        path.view()
+    fn in_pieces(&self, path: &Path) -> Path {
+        *path
     }
 }
 
 impl Search<'_> {
-    fn solve(&self, guess: Guess) -> Constrained {
-        let Guess { q_floor, p, error } = guess;
+    /// The optimum, from the parameter `p` counted from `q_floor`.
+    fn solve(&self, q_floor: Option<f64>, p: f64) -> Constrained {
         let (problem, ceilings) = (self.problem, self.ceilings);
         if ceilings.cap(0.0) < 0.0 {
             return self.rising();
@@ -334,7 +324,7 @@ impl Search<'_> {
         } else {
             (low, high.min(all_on_ceilings(problem, ceilings) + MARGIN - origin))
         };
-        self.search(member, problem.rises(), Start { p, bracket, error })
+        self.search(member, problem.rises(), Start { p, bracket, tolerance: QUADRATURE_ERROR })
     }
 
     /// The optimum that lingers before it turns, close to steady sliding on the ceiling of friction; `None` where it turns
@@ -365,7 +355,7 @@ impl Search<'_> {
             return None;
         }
         let bracket = (f64::NEG_INFINITY, ln(far));
-        Some(self.search(member, false, Start { p: ln(far) - 1.0, bracket, error: UNKNOWN_TIME_ERROR }))
+        Some(self.search(member, false, Start { p: ln(far) - 1.0, bracket, tolerance: QUADRATURE_ERROR }))
     }
 
     /// Theta rises to the end, last on a ceiling: the parameter is where the ceiling begins.
@@ -381,7 +371,7 @@ impl Search<'_> {
                 let ln_z = Some(ln(-ceilings.z_tau) - s);
                 Path::rising(problem, ceilings, Switch { way, z, ln_z, rise: ceilings.kappa, pace_over_z: 1.0 / slope })
             };
-            let start = Start { p: 1.0, bracket: (0.0, f64::INFINITY), error: UNKNOWN_TIME_ERROR };
+            let start = Start { p: 1.0, bracket: (0.0, f64::INFINITY), tolerance: QUADRATURE_ERROR };
             return self.search(member, true, start);
         }
         let member = |way: f64| {
@@ -390,7 +380,7 @@ impl Search<'_> {
             let z = ceilings.cap_of(kind, -way);
             Path::rising(problem, ceilings, Switch { way, z, ln_z: None, rise, pace_over_z: -1.0 / z })
         };
-        let start = Start { p: 0.5 * whole_way, bracket: (0.0, whole_way), error: UNKNOWN_TIME_ERROR };
+        let start = Start { p: 0.5 * whole_way, bracket: (0.0, whole_way), tolerance: QUADRATURE_ERROR };
         self.search(member, true, start)
     }
 

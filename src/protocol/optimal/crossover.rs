@@ -1,6 +1,6 @@
 //! The times at which the optimal strategy changes: closed forms, one quadrature each.
 
-use super::clamp::PathView;
+use super::clamp::Path;
 use super::extremal::{Extremal, Problem};
 use super::floor;
 use super::search::{is_proven, quadrature_tolerance};
@@ -101,7 +101,7 @@ impl Quadratures {
 
     /// Time and work of an extremal that exists.
     fn measure(&mut self, extremal: Option<Extremal>) -> (Option<f64>, Option<f64>) {
-        let sums = extremal.as_ref().and_then(|e| e.arc.sums::<false>(quadrature_tolerance(self.rtol)));
+        let sums = extremal.as_ref().and_then(|e| e.arc.sums(quadrature_tolerance(self.rtol)));
         let (Some(extremal), Some(sums)) = (extremal, sums) else {
             // Where friction fails already in a steady state, no arc need exist.
             let failed = if self.problem.is_doubtful() { Status::Unproven } else { Status::NotConverged };
@@ -111,7 +111,7 @@ impl Quadratures {
         self.stats.quadratures += 1;
         self.stats.nodes += sums.nodes;
         let problem = self.problem;
-        let least = PathView::of_free(&problem, &extremal).friction(&problem, sums.friction_min).least;
+        let least = Path::of(&problem, extremal).friction(&problem, sums.friction_min).least;
         self.meet(least, || is_proven(&problem, &extremal));
         (Some(extremal.time(&sums)), Some(extremal.work(&self.problem, &sums)))
     }

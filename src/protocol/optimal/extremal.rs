@@ -256,9 +256,7 @@ impl Problem {
         let friction_a = self.friction_a();
         let pull = friction_a - excess;
         let one_way = -excess_0 / self.from.theta;
-        if may_turn(&law, excess, pull)
-            && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
-        {
+        if let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0) {
             let x_squares = (1.0 + xi) * self.fall;
             let (theta_h, ln_theta_h) = (self.from.theta * (1.0 + xi), self.from.ln + ln_1p(xi));
             let (x_start, x_end) = (xi.sqrt(), (xi + x_squares).sqrt());
@@ -329,9 +327,7 @@ impl Problem {
         let pull = friction_a - excess;
         let (leaving, d) = self.leaving(law.a * (self.to.theta * exp_m1(eta) - eta));
         let rising = Rate::OneWay { gain: -stretch * excess_1 / self.to.theta };
-        if may_turn(&law, excess, pull)
-            && let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0)
-        {
+        if let Some(xi) = turning_distance(&law, excess, pull).filter(|&xi| xi <= 1.0) {
             let (theta_h, ln_theta_h) = (self.to.theta * (1.0 + xi), self.to.ln + ln_1p(xi));
             let x_squares = -(1.0 + xi) * exp_m1(-d);
             let (x_start, x_end) = (-(xi - x_squares).sqrt(), -xi.sqrt());
@@ -498,13 +494,6 @@ impl Extremal {
 fn edge(law: &Law, theta_h: f64, ln_theta_h: f64, x: f64, at: &Turning) -> f64 {
     let grow = 1.0 + x * x;
     2.0 * theta_h / (grow * grow * omega(law, steady_friction(law, ln_theta_h), x * x) * at.slope)
-}
-
-/// Whether the turning point can be within a factor of two: a bound that costs no logarithm.
-///
-/// `(a - b) ln(1 + xi) + pull xi` at `xi = 1`, below which `excess` must lie.
-fn may_turn(law: &Law, excess: f64, pull: f64) -> bool {
-    excess <= (law.a - law.b) * std::f64::consts::LN_2 + pull
 }
 
 /// `xi = theta_h/theta - 1` from `a E = (a - b) ln(1 + xi) - C theta xi` at `theta`; `None` where there is no turning

@@ -22,6 +22,7 @@ mod slopes;
 
 use super::{Motion, Solved, SolverStats, Status};
 use crate::model::Transition;
+use crate::numerics::LONG_ROUNDING_RTOL;
 use ceiling::Ceilings;
 use constrained::Constrained;
 use extremal::Problem;
@@ -262,8 +263,8 @@ pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64)
     (solved, solved.value.map(|_| Route::new(&problem, t_f, member.map(|(extremal, _)| extremal))))
 }
 
-/// Accuracy of every motion and of the feedback along one: the time on the arc is what is left of `t_f` after the floor arc. Chosen: a hundredth of the default `rtol`.
-pub(super) const MOTION_RTOL: f64 = 1e-12;
+/// Accuracy of every motion and of the feedback along one: the time on the arc is what is left of `t_f` after the floor arc.
+pub(super) const MOTION_RTOL: f64 = LONG_ROUNDING_RTOL;
 
 /// The least time in which there is a protocol with `v >= 1`, or `v > 0` without the bound; 0 for an acceleration.
 pub fn shortest_time(transition: &Transition, bounded: bool) -> Option<f64> {

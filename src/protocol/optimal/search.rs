@@ -2,7 +2,7 @@
 
 use super::arc::{ArcPoint, Sums};
 use super::ceiling::Ceilings;
-use super::clamp::PathView;
+use super::clamp::Path;
 use super::extremal::{Extremal, Problem};
 use super::guess::{Guess, QUADRATURE_ERROR};
 use super::{ArcKind, Optimum, Strategy, floor};
@@ -58,8 +58,8 @@ pub(super) trait Family {
     /// Whether the slope of the time may jump where the parameter is 0.
     fn breaks_at_zero(&self) -> bool;
 
-    /// The path with its pieces.
-    fn view<'a>(&self, path: &'a Self::Path) -> PathView<'a>;
+    /// The path in pieces.
+    fn in_pieces(&self, path: &Self::Path) -> Path;
 }
 
 /// What one quadrature finds.
@@ -87,8 +87,8 @@ pub(super) struct ShortArc {
 pub(super) struct Start {
     pub p: f64,
     pub bracket: (f64, f64),
-    /// Expected relative error of the time there.
-    pub error: f64,
+    /// Tolerance of the first quadrature.
+    pub tolerance: f64,
 }
 
 /// A search and its statistics.
@@ -115,7 +115,7 @@ impl<'a, F: Family> Search<'a, F> {
         fraction: f64,
         stats: SolverStats,
     ) -> (Solved<Optimum>, Option<(F::Path, f64)>) {
-        let tolerance = (1e-3 * start.error).max(accuracy.exact);
+        let tolerance = start.tolerance.max(accuracy.exact);
         let mut search = Search { family, accuracy, tolerance, last: None, stats, friction_min: f64::INFINITY };
         let root = search.root(start.p, start.bracket, fraction);
         let found = search.refined(root);
@@ -127,15 +127,15 @@ impl<'a, F: Family> Search<'a, F> {
         let Some(((p, path), (probed, _, measured))) = found.zip(last) else {
             return (Solved::without_numbers(failure(), stats), None);
         };
-        let (probed, path_view) = (family.view(&probed), family.view(&path));
+        let (probed, in_pieces) = (family.in_pieces(&probed), family.in_pieces(&path));
         // W* is stationary in the parameter up to C dt: the trapezium of C over the last step leaves an error of third
         // order.
-        let c = probed.extremal.arc.c() + path_view.extremal.arc.c();
+        let c = probed.extremal.arc.c() + in_pieces.extremal.arc.c();
         let (bound_work, nodes) = probed.bound_work(problem);
         stats.nodes += nodes;
         let work = bound_work + measured.work - 0.5 * c * measured.lag;
         let (status, value) =
-            read(problem, ceilings, &path_view, work, measured.friction_min).unwrap_or_else(|| (failure(), None));
+            read(problem, ceilings, &in_pieces, work, measured.friction_min).unwrap_or_else(|| (failure(), None));
         (Solved { status, value, stats }, Some((path, p)))
     }
 
@@ -245,9 +245,9 @@ pub(super) fn free(problem: &Problem, time: Time, rtol: f64, guess: &Guess) -> F
     if beyond == 0.0 {
         return (shortest(problem, problem.t_min()), None);
     }
-    let &Guess { q_floor, p, error } = guess;
+    let &Guess { q_floor, p, tolerance } = guess;
     let family = Extremals { problem, q_floor, t_f, beyond };
-    let start = Start { p, bracket: problem.bracket(q_floor, beyond), error };
+    let start = Start { p, bracket: problem.bracket(q_floor, beyond), tolerance };
     // What counts is the time beyond the least, which may be a small fraction of the whole.
     let accuracy = Accuracy::new(rtol, doubt, problem.law.a);
     Search::solve(&family, &Ceilings::none(problem.law), accuracy, start, beyond / t_f, stats)
@@ -268,11 +268,11 @@ pub(super) fn failure(problem: &Problem, ceilings: &Ceilings, met: f64) -> Statu
 pub(super) fn read(
     problem: &Problem,
     ceilings: &Ceilings,
-    path: &PathView,
+    path: &Path,
     work: f64,
     met: f64,
 ) -> Option<(Status, Option<Optimum>)> {
-    let &Extremal { time_at_floor, ref arc, .. } = path.extremal;
+    let Extremal { time_at_floor, arc, .. } = path.extremal;
     let (first, last) = path.pieces().next().zip(path.pieces().last())?;
     let velocity = |&ArcPoint { theta, ln_theta, ln_u: z }: &ArcPoint, kind: ArcKind| match kind {
         ArcKind::VCeiling => ceilings.v,
@@ -292,10 +292,10 @@ pub(super) fn read(
     }
     // Just off the bound, rounding may take a velocity below it; further below there is no protocol on the bound at all.
     let below = problem.bounded && v_start.min(v_end) < 1.0 - ROUNDING;
-    let doubtful = below || (friction.least_steady <= problem.unique_above() && !is_proven(problem, path.extremal));
+    let doubtful = below || (friction.least_steady <= problem.unique_above() && !is_proven(problem, &path.extremal));
     let (of_v, of_tau) = path.times;
     // Where friction is this low the velocity may fall along an arc: below the floor, or from above the ceiling.
-    let dips = || problem.bounded && of_v + of_tau == 0.0 && velocity_range(path.extremal)[0] < 1.0 - ROUNDING;
+    let dips = || problem.bounded && of_v + of_tau == 0.0 && velocity_range(&path.extremal)[0] < 1.0 - ROUNDING;
     if below || v_start > if doubtful { ceilings.v } else { most } || (doubtful && dips()) {
         return Some((Status::Unproven, None));
     }
@@ -359,7 +359,7 @@ pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
         (1.0 + law.a * here.ln_u + (law.b - law.a) * (here.ln_theta - 1.0), here.ln_u - here.ln_theta)
     };
     let bisect = |[mut low, mut high]: [f64; 2], is_low: &dyn Fn(f64) -> bool| {
-        for _ in 0..HALVINGS {
+        for _ in 0..f64::MANTISSA_DIGITS {
             let middle = 0.5 * (low + high);
             if is_low(middle) { low = middle } else { high = middle }
         }
@@ -375,9 +375,6 @@ pub(super) fn velocity_range(found: &Extremal) -> [f64; 2] {
         .map(|from| ln_v.iter().fold(from, |range, &v| if from > 0.0 { range.min(v) } else { range.max(v) }))
         .map(exp)
 }
-
-/// Halvings that find a place where the velocity is flat. Derived: half of the digits of a place are enough.
-const HALVINGS: u32 = 36;
 
 /// The extremals of a problem; the parameter counts from `q_floor`.
 struct Extremals<'a> {
@@ -409,7 +406,7 @@ impl Family for Extremals<'_> {
     }
 
     fn measure(&self, path: &Extremal, tolerance: f64) -> Option<Measured> {
-        let sums = path.arc.sums::<false>(tolerance)?;
+        let sums = path.arc.sums(tolerance)?;
         let Sums { work, friction_min, nodes, .. } = sums;
         let probe = path.probe(self.problem, &sums, self.beyond);
         Some(Measured { lag: self.beyond - path.time_beyond(&sums), work, friction_min, nodes, probe })
@@ -429,9 +426,8 @@ impl Family for Extremals<'_> {
         self.q_floor.is_some()
     }
 
-    #[inline(always)]
-    fn view<'a>(&self, path: &'a Extremal) -> PathView<'a> {
-        PathView::of_free(self.problem, path)
+    fn in_pieces(&self, path: &Extremal) -> Path {
+        Path::of(self.problem, *path)
     }
 }
 

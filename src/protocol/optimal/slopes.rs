@@ -55,7 +55,7 @@ fn along(problem: &Problem, path: &Path, tolerance: f64, stats: &mut SolverStats
     for piece in path.pieces() {
         match piece {
             ClampedPiece::Free { arc, .. } => {
-                let sums = arc.sums::<true>(tolerance)?;
+                let sums = arc.sums(tolerance)?;
                 stats.quadratures += 1;
                 stats.nodes += sums.nodes;
                 slopes.a += sums.creep;
@@ -141,7 +141,7 @@ pub(super) fn gain(problem: &Problem, path: &Path, waits: bool, tolerance: f64) 
     let (mut at_fixed_x, mut swing) = (0.0, 0.0);
     for (i, piece) in path.pieces().enumerate() {
         if let ClampedPiece::Free { arc, ends, .. } = piece {
-            let sums = arc.sums::<false>(tolerance)?;
+            let sums = arc.sums(tolerance)?;
             let edge = |at: ArcPoint| at.theta / exp_m1(at.ln_u);
             at_fixed_x += sums.sensitivity + edge(ends[1]) - if i == 0 { 0.0 } else { edge(ends[0]) };
             swing += sums.swing;

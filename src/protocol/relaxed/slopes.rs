@@ -42,7 +42,7 @@ fn by_ceiling(arc: &BoundArc, turn: usize, problem: &Problem, hamiltonian: f64) 
         return 0.0;
     }
     let least = arc.ends[0].theta.min(arc.ends[1].theta);
-    if arc.length <= SHORT_SLIP && arc.span <= SHORT_SPAN * least {
+    if arc.length <= SHORT && arc.span <= SHORT * least {
         return problem.over_short_arc(arc, hamiltonian);
     }
     let Problem { a, b, ceiling, .. } = *problem;
@@ -50,12 +50,10 @@ fn by_ceiling(arc: &BoundArc, turn: usize, problem: &Problem, hamiltonian: f64) 
     (a - b + hamiltonian / ceiling) * arc.length / ceiling + start - end
 }
 
-/// Slip up to which an arc is short, and its derivative a quadrature, since the terms of the closed form cancel. Derived: the distance of theta from the
-/// steady state of the ceiling changes by a factor of e at most, and the error of [`SHORT_NODES`] is `4.1^-32`.
-const SHORT_SLIP: f64 = 1.0;
-
-/// Change of theta, relative to its lesser end, up to which an arc is short. Chosen: beyond, the closed form loses two digits at most.
-const SHORT_SPAN: f64 = 0.5;
+/// Slip, and change of theta relative to its lesser end, up to which an arc is short, and its derivative a quadrature, since the terms of the closed
+/// form cancel. Derived: the distance of theta from the steady state of the ceiling changes by a factor of e at most, and the error of [`SHORT_NODES`]
+/// is `4.1^-32`, or `5.8^-32` from the singularity at 0.
+const SHORT: f64 = 1.0;
 
 impl Problem {
     /// [`by_ceiling`] of a short arc: the integral over time of `tau + a + costate dtheta'/dv`.
