@@ -392,3 +392,13 @@ fn regress_a_turn_where_friction_is_too_low_is_unproven() {
     let solved = solve(&transition, 0.002, bounds, 1e-10);
     assert_eq!((solved.status, solved.value), (Status::Unproven, None));
 }
+
+/// Rounding alone keeps the ceiling off the friction of steady sliding at the end: the time on it has no digit, and was 15.6.
+#[test]
+fn regress_a_time_on_a_ceiling_beyond_the_duration_is_no_answer() {
+    let law = Law { a: 0.005465879976621947, b: 0.0 };
+    let transition = Transition { law, v_i: 194588.4328281252, v_f: 1.0134000213417642 };
+    let bounds = Bounds::new(true).with_tau_ceiling(1.0000727565203265);
+    let solved = solve(&transition, 4.325908089474069, bounds, 6.258699240760209e-12);
+    assert_eq!((solved.status, solved.value), (Status::NotConverged, None));
+}

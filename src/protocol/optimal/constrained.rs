@@ -10,10 +10,10 @@ use super::lifetime::Lifetime;
 use super::search::{self, Accuracy, Family, Measured, ShortArc, Start, Time};
 use super::{ArcKind, Optimum};
 use crate::model::Law;
-use crate::numerics::MAX_LN;
 use crate::numerics::elementary::{exp, exp_m1, ln, phi};
 use crate::numerics::root::Probe;
 use crate::numerics::turning::turning;
+use crate::numerics::{LONG_ROUNDING_RTOL, MAX_LN};
 use crate::protocol::{Solved, SolverStats, Status};
 
 /// What the bounds allow.
@@ -399,6 +399,11 @@ impl Search<'_> {
         accuracy.least = (SLOPE_CHANGES * accuracy.least).max(1e-16);
         accuracy.exact *= LAST_TOLERANCE_RATIO;
         let (solved, path) = search::Search::solve(&family, ceilings, accuracy, start, room / t_f, stats);
+        // On a ceiling that rounding alone keeps off steady friction a long arc has no digits.
+        let on_bounds = |found: Optimum| found.time_at_floor + found.time_at_v_ceiling + found.time_at_tau_ceiling;
+        if solved.value.is_some_and(|found| on_bounds(found) > (1.0 + rtol.max(LONG_ROUNDING_RTOL)) * t_f) {
+            return Constrained::without_numbers(Status::NotConverged, solved.stats);
+        }
         let mut path = path.filter(|_| solved.value.is_some()).map(|(path, _)| path);
         path.iter_mut().for_each(Path::refer_to_switches);
         Constrained { solved, path, sitting: None }
