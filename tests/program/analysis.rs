@@ -128,7 +128,7 @@ fn comparisons_with_unknown_words_or_rounded_numbers_are_noted() {
     let close = "t_f BETWEEN 0.03700001 * (1 - 1e-6) AND 0.03700001 * (1 + 1e-6)";
     assert_eq!(note, format!("note: `=` compares all digits of `t_f`; for a rounded number, write {close}\n"));
     assert_eq!(asked(&close.replace("0.03700001", "0.037"), "t_f"), ("t_f\n0.037\n".to_owned(), String::new()));
-    // The same in a count; not for a number that no row has in more digits, or that a row has.
+    // Also in a count; not for a number that no row has in more digits, or that a row has.
     assert!(asked("t_f = 0.03700001", "count(*)").1.starts_with("note: `=` compares all digits of `t_f`"));
     assert!(asked("gap = -0.03700001 OR t_f = 0.038", "count(*)").1.is_empty());
     // A name after AS has words of its own.
