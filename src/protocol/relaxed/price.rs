@@ -6,6 +6,7 @@
 use super::Problem;
 use super::state::State;
 use crate::model::StateLaw;
+use crate::numerics::elementary::exp_m1;
 use crate::numerics::turning::turning;
 
 /// Where the price is least.
@@ -52,7 +53,8 @@ impl Problem {
             let under = ceiling * state.above_ceiling + state.below_floor;
             return [ceiling * state.above_ceiling, state.below_floor].map(|part| part / under);
         }
-        let beyond = (state.v - 1.0) * (state.v + 1.0);
+        // The velocity rounds where theta is almost 1.
+        let beyond = exp_m1(state.below_floor) * (state.v + 1.0);
         let below = state.v * state.v * state.excess * (state.excess + 2.0);
         [below, beyond].map(|part| part / ((ceiling - 1.0) * (ceiling + 1.0)))
     }
