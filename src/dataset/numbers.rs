@@ -57,8 +57,11 @@ pub fn flags(cells: &[f64]) -> Chunk {
     }
 }
 
-/// Distinct consecutive numbers and runs of their indices, such as the optimal work along a landscape; `None` for a column without long runs.
-fn repeating(values: &[f64]) -> Option<(Vec<f64>, Vec<(usize, usize)>)> {
+/// Distinct consecutive numbers and runs of their indices.
+type Repeated = (Vec<f64>, Vec<(usize, usize)>);
+
+/// Numbers with long runs, such as the optimal work along a landscape; `None` for a column without them.
+fn repeating(values: &[f64]) -> Option<Repeated> {
     let most = values.len().div_ceil(16);
     let runs = values.chunk_by(|one, next| one.to_bits() == next.to_bits());
     let (distinct, lengths): (Vec<f64>, Vec<usize>) = runs.map(|run| (run[0], run.len())).take(most + 1).unzip();

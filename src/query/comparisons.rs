@@ -43,7 +43,11 @@ impl Tables {
         let close = format!("{column} BETWEEN {number} * (1 {low} 1e-6) AND {number} * (1 {high} 1e-6)");
         let found = self.query(&format!("SELECT DISTINCT {column} FROM \"{table}\" WHERE {close} LIMIT 2")).ok()?;
         let mut cells = Vec::new();
-        found.rows(|rows| Ok(cells.extend(rows.into_iter().flatten()))).ok()?;
+        let take = |rows: Vec<Vec<Cell>>| {
+            cells.extend(rows.into_iter().flatten());
+            Ok(())
+        };
+        found.rows(take).ok()?;
         let is_rounded = !cells.is_empty() && !cells.contains(&Cell::Number(*number));
         is_rounded.then(|| format!("`=` compares all digits of `{column}`; for a rounded number, write {close}"))
     }

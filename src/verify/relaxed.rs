@@ -181,7 +181,7 @@ fn bang_bang(
     let by_b = first.by_b + resting_by_b + second.by_b;
     row.compare_relative("dwork_db", by_b, by_b.abs() + t_f);
     block.compare_costates(row, &optimum, ends);
-    let dear = if chatter.is_some() {
+    let above = if chatter.is_some() {
         let around = [turn - PRICE_STEP, turn + PRICE_STEP].map(|w| block.price(w));
         if around.iter().all(|other| *other > price) { 0.0 } else { f64::INFINITY }
     } else if is_proven {
@@ -200,7 +200,7 @@ fn bang_bang(
         off.abs() / (1.0 + start.abs().max(end.abs())),
         apart(optimum.work, work),
         apart(optimum.hamiltonian, price),
-        dear,
+        above,
     ]))
 }
 

@@ -809,7 +809,7 @@ fn regress_maps_of_many_samples_are_filled() {
     assert!(svg.contains("<image") && map.replace('\n', " ").contains(note), "{map}");
 }
 
-/// A cell with rows of several labels shows one of them, and the picture says so.
+/// A cell with rows of several labels shows one of them, and a note states it.
 #[test]
 fn regress_several_labels_of_a_cell_are_noted() {
     let grid = "t_f = { geomspace = [0.01, 0.1, 5] }\nv_f = { geomspace = [50.0, 200.0, 5] }\nv_i = 3.0\n";
