@@ -352,8 +352,8 @@ fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 /// Greatest number of points of a curve that may turn back. Chosen: a hundred loops stay smooth.
 const MAX_TURNING_POINTS: usize = 5 * MAX_POINTS;
 
-/// Least distance of the points of such a curve, as a fraction of the panel. Derived: a dot of a wide picture in print.
-const MIN_DISTANCE: f64 = 4.0 / MAX_POINTS as f64;
+/// Least distance of the points of such a curve, as a fraction of the panel. Chosen: half a dot of a wide picture in print.
+const MIN_DISTANCE: f64 = 5e-4;
 
 /// Points at equal distances along a curve over these scales, at least, with the first and the last.
 fn spaced(points: Vec<(f64, f64)>, [x, y]: [&Scale; 2]) -> Vec<(f64, f64)> {

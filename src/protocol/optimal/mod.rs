@@ -263,7 +263,8 @@ pub(super) fn route(transition: &Transition, t_f: f64, bounded: bool, rtol: f64)
     (solved, solved.value.map(|_| Route::new(&problem, t_f, member.map(|(extremal, _)| extremal))))
 }
 
-/// Accuracy of every motion and of the feedback along one: the time on the arc is what is left of `t_f` after the floor arc.
+/// Accuracy of every motion and of the feedback along one: the time on the arc is what is left of `t_f` after the floor arc. Derived: the rounding
+/// of such sums, a hundredth of the default `rtol`.
 pub(super) const MOTION_RTOL: f64 = LONG_ROUNDING_RTOL;
 
 /// The least time in which there is a protocol with `v >= 1`, or `v > 0` without the bound; 0 for an acceleration.

@@ -24,7 +24,7 @@ pub(super) const MAX_STEPS: u32 = 100_000;
 /// Chosen: the errors of the thirty-odd steps of a slip add up.
 pub(super) const STEP_ERROR: f64 = 0.03;
 
-/// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Measured at the loosest tolerance.
+/// Error of `ln(v/v_f)` at an extremum of the dense output, at most. Chosen; the budgets of `step_response` judge it.
 const DENSE_OUTPUT_ERROR: f64 = 1e-2;
 
 /// Error estimate of a step, fraction of the motion, at most. Chosen: an estimate as large as the motion allows steps that
