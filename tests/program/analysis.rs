@@ -131,6 +131,11 @@ fn comparisons_with_unknown_words_or_rounded_numbers_are_noted() {
     // Also in a count; not for a number that no row has in more digits, or that a row has.
     assert!(asked("t_f = 0.03700001", "count(*)").1.starts_with("note: `=` compares all digits of `t_f`"));
     assert!(asked("gap = -0.03700001 OR t_f = 0.038", "count(*)").1.is_empty());
+    // A negative number as the table of the terminal shows it.
+    let shown = printed(folder.path(), &["query", "results/test", "SELECT min(alpha_2) AS x FROM best_cubic"]);
+    let shown = shown.lines().last().expect("has a row").trim();
+    let between = format!("alpha_2 BETWEEN {shown} * (1 + 1e-6) AND {shown} * (1 - 1e-6)\n");
+    assert!(shown.starts_with('-') && asked(&format!("alpha_2 = {shown}"), "work").1.ends_with(&between), "{shown}");
     // A name after AS has words of its own.
     let renamed = "SELECT count(*) AS n FROM (SELECT 'good' AS status FROM best_cubic) AS t WHERE status = 'good'";
     assert_eq!(printed(folder.path(), &["query", "results/test", renamed]), "n\n3\n");
